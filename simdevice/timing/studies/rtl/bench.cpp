@@ -1,7 +1,7 @@
 // Runs a rasterizer module on tiles: bench IN OUT. Files are little-endian words of 32 bits.
 // IN: tiles, cycles until a request that could not be foreseen is answered, alpha's floor and ceiling, transmittance's
-// floor, depth's offset and scale; of each tile its mode, the list's address in bytes and its primitives; then memory.
-// OUT: cycles, cycles by cause (six), the longest way of a pixel through a PE, two words for later; then what was written.
+// floor, depth's offset and scale, whether groups are blocks, saturation; of each tile its mode, the list's address in bytes and its primitives; then memory.
+// OUT: cycles, cycles by cause (six), the longest way of a pixel through a PE; then what was written.
 #include "Vraster_module.h"
 #include "verilated.h"
 #include <cstdint>
@@ -21,9 +21,9 @@ static std::vector<uint32_t> read_words(const char *path) {
 int main(int count, char **arguments) {
     if (count != 3) return 2;
     const std::vector<uint32_t> in = read_words(arguments[1]);
-    if (in.size() < 7) return 2;
+    if (in.size() < 9) return 2;
     const uint32_t tiles = in[0], latency = in[1];
-    const uint32_t *tile = in.data() + 7, *memory = tile + 3 * tiles;
+    const uint32_t *tile = in.data() + 9, *memory = tile + 3 * tiles;
     VerilatedContext context;
     Vraster_module module(&context);
     module.alpha_floor = in[2];
@@ -31,6 +31,8 @@ int main(int count, char **arguments) {
     module.transmittance_floor = in[4];
     module.depth_offset = in[5];
     module.depth_scale = in[6];
+    module.blocks = in[7];
+    module.saturation = in[8];
     module.reset = 1;
     module.tile_valid = 0;
     module.data_valid = 0;
@@ -92,8 +94,6 @@ int main(int count, char **arguments) {
     put(cycles);
     for (uint64_t cause : causes) put(cause);
     put(longest);
-    put(0);
-    put(0);
     std::fwrite(written.data(), sizeof(uint32_t), written.size(), file);
     return std::fclose(file) == 0 ? 0 : 2;
 }

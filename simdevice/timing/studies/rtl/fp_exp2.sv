@@ -72,17 +72,19 @@ module fp_exp2 #(
             localparam logic [6*(RESULT+1)-1:0] COEFFICIENTS = WIDE
                 ? {28'd240031, 28'd1234721, 28'd7470163, 28'd32240064, 28'd93032692, 28'd134217728}
                 : {15'd0, 15'd0, 15'd1187, 15'd3827, 15'd11363, 15'd16384};
+            logic [DEGREE*(RESULT+1)-1:0] held_sums;
+            logic [DEGREE*FRACTION-1:0] held_rests;
             logic [(DEGREE+1)*(RESULT+1)-1:0] sums;
             logic [(DEGREE+1)*FRACTION-1:0] rests;
-            assign sums[RESULT:0] = COEFFICIENTS[DEGREE*(RESULT+1)+:RESULT+1];
-            assign rests[FRACTION-1:0] = rest;
+            assign sums = {held_sums, COEFFICIENTS[DEGREE*(RESULT+1)+:RESULT+1]};
+            assign rests = {held_rests, rest};
             for (genvar i = 0; i < DEGREE; i = i + 1) begin : horner
                 logic [RESULT+FRACTION:0] term;
                 assign term = ({{FRACTION{1'b0}}, sums[i*(RESULT+1)+:RESULT+1]}
                     * {{(RESULT+1){1'b0}}, rests[i*FRACTION+:FRACTION]}) >> FRACTION;
                 always_ff @(posedge clk) begin
-                    sums[(i+1)*(RESULT+1)+:RESULT+1] <= COEFFICIENTS[(DEGREE-1-i)*(RESULT+1)+:RESULT+1] + term[RESULT:0];
-                    rests[(i+1)*FRACTION+:FRACTION] <= rests[i*FRACTION+:FRACTION];
+                    held_sums[i*(RESULT+1)+:RESULT+1] <= COEFFICIENTS[(DEGREE-1-i)*(RESULT+1)+:RESULT+1] + term[RESULT:0];
+                    held_rests[i*FRACTION+:FRACTION] <= rests[i*FRACTION+:FRACTION];
                 end
             end
             assign value = sums[DEGREE*(RESULT+1)+:RESULT+1];

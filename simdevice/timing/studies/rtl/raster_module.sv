@@ -2,15 +2,12 @@
 // the controller. It is given tiles one after the other, each a list in memory; it fetches the lists through its port,
 // which moves 16 bytes in a cycle, in or out, and writes three numbers for each pixel.
 //
-// A group is a row of the tile, or with BLOCKS a block of 4x4 pixels. Each primitive names the groups that it is evaluated
-// in. SATURATION: 0, a list is taken to its end; 1, it ends once all pixels are finished; 2, groups of finished pixels are
-// left out, too. A list starts at a multiple of 16 bytes, and BATCH is a multiple of 8.
+// A group is a row of the tile or a block of 4x4 pixels. Each primitive names the groups that it is evaluated in. A list
+// starts at a multiple of 16 bytes, and BATCH is a multiple of 8.
 module raster_module #(
     parameter int EXPONENT = 8,
     parameter int MANTISSA = 23,
     parameter int BATCH = 32,
-    parameter int BLOCKS = 0,
-    parameter int SATURATION = 1,
     parameter int TWO_PATHS = 0,
     parameter int BOOTH = 0,
     parameter int POLYNOMIAL = 0
@@ -23,6 +20,10 @@ module raster_module #(
     input  logic [EXPONENT+MANTISSA:0] alpha_floor,
     input  logic [EXPONENT+MANTISSA:0] alpha_ceiling,
     input  logic [EXPONENT+MANTISSA:0] transmittance_floor,
+    // Whether groups are blocks. Saturation: 0, a list is taken to its end; 1, it ends once all pixels are finished; 2,
+    // groups of finished pixels are left out, too.
+    input  logic blocks,
+    input  logic [1:0] saturation,
     // The next tile: its mode (1 for Gaussians), where its list is and how many primitives that has, at least 1.
     input  logic tile_valid,
     output logic tile_ready,
@@ -134,8 +135,8 @@ module raster_module #(
         .at({using, current}), .numbers(numbers),
         .next_at(active ? {using, current + 1'b1} : {using, {(INDEX-1){1'b0}}}), .next_groups(next_groups));
 
-    assign tile_finished = SATURATION != 0 && mode && (&finished_groups);
-    assign open_groups = SATURATION == 2 && mode ? ~finished_groups : 16'hffff;
+    assign tile_finished = saturation != 0 && mode && (&finished_groups);
+    assign open_groups = saturation == 2 && mode ? ~finished_groups : 16'hffff;
     assign pending = todo & open_groups;
     always_comb begin
         group = 0;
@@ -273,14 +274,9 @@ module raster_module #(
             logic [BITS-1:0] x, y, transmittance, next_transmittance, depth;
             logic [3*BITS-1:0] color, next_color, fragment;
             logic covered, reaches, open, blends, blended, nearer;
-            if (BLOCKS != 0) begin : in_blocks
-                always_ff @(posedge clk) begin
-                    x <= centre({group[1:0], 2'(p % 4)});
-                    y <= centre({group[3:2], 2'(p / 4)});
-                end
-            end else begin : in_rows
-                assign x = centre(4'(p));
-                always_ff @(posedge clk) y <= centre(group);
+            always_ff @(posedge clk) begin
+                x <= centre(blocks ? {group[1:0], 2'(p % 4)} : 4'(p));
+                y <= centre(blocks ? {group[3:2], 2'(p / 4)} : group);
             end
             pe #(.EXPONENT(EXPONENT), .MANTISSA(MANTISSA), .GAUSSIANS(1), .TWO_PATHS(TWO_PATHS), .BOOTH(BOOTH),
                  .POLYNOMIAL(POLYNOMIAL)) element (

@@ -4,7 +4,7 @@
 use crate::exponential::Exponential;
 use crate::number::Format;
 use crate::pe::{Gaussian, Pe, Pixel, Thresholds, Triangle};
-use timing::work::{Mode, Run, Saturation, TILE_GROUPS, TILE_SIDE, TileWork};
+use timing::work::{Mode, Run, TILE_GROUPS, TILE_SIDE, TileWork};
 
 const GROUPS: usize = TILE_GROUPS as usize;
 /// Pixels of a group, and PEs of a module.
@@ -74,6 +74,8 @@ pub struct Module {
     pub exponential: Exponential,
     /// Its groups.
     pub groups: Groups,
+    /// Whether groups of finished pixels are left out.
+    pub skips_groups: bool,
     /// Thresholds of the draw.
     pub thresholds: Thresholds,
     /// Depth is the first plus the second over w.
@@ -85,7 +87,7 @@ pub struct Module {
 pub struct Drawn {
     /// Three numbers for each pixel, by group and lane: a colour, or u, v and depth.
     pub pixels: Vec<[u32; 3]>,
-    /// The work, with its runs as fine as single primitives.
+    /// The work, with its runs as fine as single primitives. What a primitive reaches is what it is evaluated in.
     pub work: TileWork,
 }
 
@@ -96,6 +98,7 @@ impl Module {
             format,
             exponential,
             groups,
+            skips_groups: false,
             thresholds: Thresholds::new(format),
             depth: [0, format.one()],
         }
@@ -130,8 +133,12 @@ impl Module {
             if open == 0 {
                 break;
             }
+            let (open, rows) = match self.skips_groups {
+                true => (open, self.open_rows(&pixels)),
+                false => (u16::MAX, TILE_SIDE as u8),
+            };
             let reached = primitive.groups() & open;
-            push(&mut work.runs, open, self.open_rows(&pixels), reached);
+            push(&mut work.runs, open, rows, reached);
             let Primitive::Gaussian(_, gaussian) = primitive else {
                 continue;
             };
@@ -225,14 +232,5 @@ fn push(runs: &mut Vec<Run>, open: u16, rows: u8, reached: u16) {
             reached,
             ..Run::default()
         }),
-    }
-}
-
-/// How a machine saturates that leaves out groups of finished pixels, or not.
-pub fn saturation(skips_groups: bool) -> Saturation {
-    if skips_groups {
-        Saturation::Reached
-    } else {
-        Saturation::Tile
     }
 }

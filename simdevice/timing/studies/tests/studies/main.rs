@@ -2,7 +2,9 @@
 
 mod models;
 mod paper;
+mod rtl;
 mod sensitivity;
+mod tiles;
 
 fn main() -> std::process::ExitCode {
     gaurast_runner::main()
