@@ -55,6 +55,9 @@ pub fn sources() -> Vec<&'static str> {
         .collect()
 }
 
+/// Cycles until the bench's memory answers what could not be foreseen, the presets' 100 ns.
+pub const LATENCY: u32 = 100;
+
 /// Cycles of a PE, as `latencies.svh` has them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Latencies {
@@ -82,6 +85,11 @@ impl Latencies {
             triangle: mul + 2 * add + div + mul + 2 * add,
             carried: mul + add + 1,
         }
+    }
+
+    /// The longer of both modes.
+    pub fn longest(self) -> u32 {
+        self.gaussian.max(self.triangle)
     }
 }
 
