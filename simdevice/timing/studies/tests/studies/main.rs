@@ -5,6 +5,7 @@ mod paper;
 mod rtl;
 mod sensitivity;
 mod tiles;
+mod trace;
 
 fn main() -> std::process::ExitCode {
     gaurast_runner::main()
