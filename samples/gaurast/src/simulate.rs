@@ -12,12 +12,13 @@ use gaurast_picture::Size;
 use thiserror::Error;
 use timing::FrameWork;
 use timing::config::{Config, ConfigError, DEFAULT_PRESET};
+use timing::fast::{self, TileSpan};
 use timing::raster::RasterReport;
-use timing::schedule;
+use timing::schedule::{self, Engine, ModuleSpan, Span};
 use timing::simulate::{self, Simulation};
 use timing::work::{Trace, TraceError};
 use timing_studies::what_if::{WhatIf, what_ifs};
-use timing_studies::{paper, stepped};
+use timing_studies::{area, paper, rtl, stepped};
 
 use crate::simulate_plot as plot;
 use crate::simulate_report as report;
@@ -51,6 +52,8 @@ pub enum Error {
     Draw(String),
     #[error("--sweep {0}: not NAME=FIRST..LAST or NAME=VALUE,VALUE,...")]
     Sweep(String),
+    #[error("--sweep: {0} machines, and at most {MAX_GRID}")]
+    Grid(usize),
     #[error("output: {0}")]
     Output(#[from] std::io::Error),
     #[error("output: {0}")]
@@ -86,13 +89,34 @@ pub struct SimulateArguments {
     #[arg(long = "set", value_name = "NAME=VALUE")]
     pub settings: Vec<String>,
 
-    /// Simulates one machine after the other, as in modules=1..32 or saturation=none,tile,block
+    /// Simulates one machine after the other, as in modules=1..32 or saturation=none,tile,block; given more than once, every
+    /// combination
     #[arg(long, value_name = "NAME=FIRST..LAST")]
-    pub sweep: Option<String>,
+    pub sweep: Vec<String>,
 
     /// Plots the sweep's speed-ups and energy
     #[arg(long, value_name = "FILE.svg", requires = "sweep")]
     pub plot: Option<PathBuf>,
+
+    /// Plots each machine's raster time over its area, with the front of those that no other beats
+    #[arg(long, value_name = "FILE.svg", requires = "sweep")]
+    pub pareto: Option<PathBuf>,
+
+    /// Plots the stages under the roofs of shader cores and rasterizer
+    #[arg(long, value_name = "FILE.svg")]
+    pub roofline: Option<PathBuf>,
+
+    /// Draws the frame's tiles, coloured by the cycles that they take
+    #[arg(long, value_name = "FILE.svg")]
+    pub tiles: Option<PathBuf>,
+
+    /// Simulates every frame of the trace, not the last one alone
+    #[arg(long, conflicts_with_all = ["sweep", "what_if", "stepped"])]
+    pub every_frame: bool,
+
+    /// Writes the rasterizer module in SystemVerilog, and nothing else
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["scene", "sweep", "what_if", "trace", "stepped", "paper"])]
+    pub emit_rtl: Option<PathBuf>,
 
     /// Shows what each skip would bring as hardware
     #[arg(long, conflicts_with = "sweep")]
@@ -140,14 +164,22 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Error> {
             Format::Csv => report::paper_csv(&paper::report()),
         });
     }
+    if let Some(folder) = &arguments.emit_rtl {
+        return rtl::write(folder).map_err(|source| Error::File {
+            path: folder.clone(),
+            source,
+        });
+    }
     // Mistakes on the command line should not wait for a large scene.
     let config = config(arguments)?;
-    let machines = match &arguments.sweep {
-        Some(sweep) => sweep_values(sweep)?
-            .into_iter()
-            .map(|value| Ok((value.clone(), config.with(&[value])?)))
-            .collect::<Result<Vec<_>, Error>>()?,
-        None => vec![(machine_name(arguments), config.clone())],
+    let machines = if arguments.sweep.is_empty() {
+        vec![(machine_name(arguments), config.clone())]
+    } else {
+        let named = |settings: Vec<String>| Ok((settings.join(" "), config.with(&settings)?));
+        let grid = grid(&arguments.sweep)?;
+        grid.into_iter()
+            .map(named)
+            .collect::<Result<Vec<_>, Error>>()?
     };
     let trace = work(arguments)?;
     let name = || {
@@ -167,24 +199,78 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Error> {
     if arguments.stepped {
         return print(&report::compared(&models(&trace, &config)?));
     }
-    let results: Vec<_> = machines
-        .iter()
-        .map(|(name, config)| (name.clone(), simulate::simulate(frame, config)))
-        .collect();
+    let results = if arguments.every_frame {
+        let named = |(number, frame)| {
+            (
+                format!("frame {number}"),
+                simulate::simulate(frame, &config),
+            )
+        };
+        trace.frames.iter().enumerate().map(named).collect()
+    } else {
+        simulate_all(frame, &machines)
+    };
     if let Some(path) = &arguments.trace {
         let (_, config) = &machines[0];
         write_timeline(path, &trace, config, arguments.frames)?;
     }
-    if let (Some(path), Some(sweep)) = (&arguments.plot, &arguments.sweep) {
-        let swept = sweep.split('=').next().unwrap_or_default();
-        let svg = plot::svg(swept, &results);
-        replace(path, svg.as_bytes())?;
+    if let Some(path) = &arguments.plot {
+        let swept: Vec<_> = arguments
+            .sweep
+            .iter()
+            .filter_map(|sweep| sweep.split('=').next())
+            .collect();
+        replace(path, plot::svg(&swept.join(", "), &results).as_bytes())?;
+    }
+    if let Some(path) = &arguments.pareto {
+        replace(path, plot::pareto(&machines, &results).as_bytes())?;
+    }
+    if let (Some(path), Some((_, result))) = (&arguments.roofline, results.first()) {
+        replace(
+            path,
+            plot::roofline(frame, result, &machines[0].1).as_bytes(),
+        )?;
+    }
+    let spans = tile_spans(frame, &machines[0].1);
+    if let Some(path) = &arguments.tiles {
+        replace(path, plot::tiles(frame, &spans, &machines[0].1).as_bytes())?;
     }
     print(&match (arguments.format, results.as_slice()) {
-        (Format::Table, [(_, one)]) => report::one(frame, one, &config),
+        (Format::Table, [(_, one)]) if !arguments.every_frame => {
+            report::one(frame, one, &config, &spans)
+        }
         (Format::Table, many) => report::many(many),
         (Format::Json, many) => serde_json::to_string_pretty(many)? + "\n",
-        (Format::Csv, many) => report::csv(many),
+        (Format::Csv, many) => report::csv(many, &areas(&machines, many.len())),
+    })
+}
+
+/// A frame's tiles in the modules, a frame alone.
+fn tile_spans(frame: &FrameWork, config: &Config) -> Vec<TileSpan> {
+    fast::rasterize_tiles(&simulate::of_rasterizer(frame, config), config, 0.0).1
+}
+
+/// The area that Gaussians add to each of `count` rows, which are of as many machines or all of one.
+fn areas(machines: &[(String, Config)], count: usize) -> Vec<f64> {
+    let of = |(_, config): &(String, Config)| area::area(config).added;
+    machines.iter().map(of).cycle().take(count).collect()
+}
+
+/// The frame on every machine, on all of the host's cores.
+fn simulate_all(frame: &FrameWork, machines: &[(String, Config)]) -> Vec<(String, Simulation)> {
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let each = machines.len().div_ceil(cores).max(1);
+    let one = |(name, config): &(String, Config)| (name.clone(), simulate::simulate(frame, config));
+    std::thread::scope(|scope| {
+        let parts: Vec<_> = machines
+            .chunks(each)
+            .map(|part| scope.spawn(move || part.iter().map(one).collect::<Vec<_>>()))
+            .collect();
+        let results = parts.into_iter().flat_map(|part| match part.join() {
+            Ok(results) => results,
+            Err(panic) => std::panic::resume_unwind(panic),
+        });
+        results.collect()
     })
 }
 
@@ -225,7 +311,7 @@ fn what_if_text(format: Format, variants: &[WhatIf]) -> Result<String, Error> {
     Ok(match format {
         Format::Table => report::many(&named),
         Format::Json => serde_json::to_string_pretty(variants)? + "\n",
-        Format::Csv => report::csv(&named),
+        Format::Csv => report::csv(&named, &[]),
     })
 }
 
@@ -259,6 +345,29 @@ fn read(path: &Path) -> Result<String, Error> {
 
 /// The most machines of a range.
 const MAX_MACHINES: u32 = 64;
+
+/// The most machines of all combinations.
+const MAX_GRID: usize = 10_000;
+
+/// Every combination of what sweeps go through, the last one changing fastest.
+fn grid(sweeps: &[String]) -> Result<Vec<Vec<String>>, Error> {
+    let mut grid = vec![Vec::new()];
+    for sweep in sweeps {
+        let values = sweep_values(sweep)?;
+        let count = grid.len() * values.len();
+        if count > MAX_GRID {
+            return Err(Error::Grid(count));
+        }
+        let with = |settings: &Vec<String>| {
+            let settings = settings.clone();
+            values
+                .iter()
+                .map(move |value| [settings.as_slice(), std::slice::from_ref(value)].concat())
+        };
+        grid = grid.iter().flat_map(with).collect();
+    }
+    Ok(grid)
+}
 
 /// The settings that a sweep goes through.
 fn sweep_values(sweep: &str) -> Result<Vec<String>, Error> {
@@ -351,8 +460,43 @@ fn write_timeline(path: &Path, trace: &Trace, config: &Config, count: u16) -> Re
     let once: Vec<Simulation> = trace.frames.iter().map(simulate).collect();
     let frames: Vec<_> = once.into_iter().cycle().take(count.into()).collect();
     let spans = simulate::timeline(&frames, config);
-    let json = schedule::chrome_trace(&spans, config);
+    let modules = module_spans(trace, &frames, &spans, config);
+    let json = schedule::chrome_trace_of_modules(&spans, &modules, config);
     replace(path, &serde_json::to_vec(&json)?)
+}
+
+/// The tiles of each frame in the modules, within its span of the rasterizer.
+fn module_spans(
+    trace: &Trace,
+    frames: &[Simulation],
+    spans: &[Span],
+    config: &Config,
+) -> Vec<ModuleSpan> {
+    let tiles: Vec<_> = trace
+        .frames
+        .iter()
+        .zip(frames)
+        .map(|(frame, result)| {
+            let frame = simulate::of_rasterizer(frame, config);
+            fast::rasterize_tiles(&frame, config, result.contention_gb_s).1
+        })
+        .collect();
+    let to_ms = 1e-6 / config.rasterizer.clock_ghz;
+    let rasters = spans
+        .iter()
+        .filter(|span| span.engine == Engine::Rasterizer);
+    rasters
+        .flat_map(|span| {
+            let tiles = &tiles[span.frame % tiles.len()];
+            tiles.iter().map(|tile| ModuleSpan {
+                module: tile.module,
+                frame: span.frame,
+                at: tile.at,
+                begin_ms: span.begin_ms + tile.begin * to_ms,
+                end_ms: span.begin_ms + tile.end * to_ms,
+            })
+        })
+        .collect()
 }
 
 fn replace(path: &Path, bytes: &[u8]) -> Result<(), Error> {
@@ -380,6 +524,40 @@ mod tests {
         assert!(values("batch=1..1000").len() <= 64);
         for bad in ["modules", "modules=4..2", "modules=a..b"] {
             assert!(sweep_values(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn grids_have_every_combination() {
+        let of = |sweeps: &[&str]| {
+            let sweeps: Vec<_> = sweeps.iter().map(ToString::to_string).collect();
+            grid(&sweeps)
+        };
+        let all = of(&["modules=2..3", "batch=16,32,64"]).unwrap_or_default();
+        assert_eq!(all.len(), 6);
+        assert_eq!(all[1], ["modules=2", "batch=32"]);
+        assert_eq!(all[5], ["modules=3", "batch=64"]);
+        let many = ["modules=1..64", "batch=1..64", "pes_per_module=1..64"];
+        assert!(matches!(of(&many), Err(Error::Grid(262_144))));
+    }
+
+    #[test]
+    fn the_paths_of_a_sweep_are_those_of_one_machine_after_the_other() {
+        let frame = simulate::even_frame([64, 64], 1000, 0.3);
+        let machines: Vec<_> = (1..8)
+            .map(|modules| {
+                let setting = format!("modules={modules}");
+                let config = Config::preset(DEFAULT_PRESET, std::slice::from_ref(&setting));
+                (setting, config.expect("a preset"))
+            })
+            .collect();
+        let all = simulate_all(&frame, &machines);
+        assert_eq!(all.len(), machines.len());
+        for ((name, result), (machine, config)) in all.iter().zip(&machines) {
+            assert_eq!(
+                (name, result),
+                (machine, &simulate::simulate(&frame, config))
+            );
         }
     }
 }

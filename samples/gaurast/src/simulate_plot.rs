@@ -1,7 +1,16 @@
-//! A sweep as a picture: speed-ups and energy, each machine a step of the same width.
+//! Pictures of what was simulated: a sweep's curves, the front of its machines, roofs over the stages, and a frame's tiles.
+
+use std::fmt::Write as _;
+
+use timing::config::Config;
+use timing::fast::TileSpan;
+use timing::pe::Operations;
 
 use timing::simulate::Simulation;
+use timing::work::FrameWork;
+use timing_studies::area;
 use timing_studies::chart::{self, Chart, Corner, Curve};
+use timing_studies::scatter::{self, Axis, Line, Plot, Point};
 
 /// A panel's size in pixels.
 const PANEL: [u32; 2] = [560, 380];
@@ -51,6 +60,169 @@ fn panel(axes: [&str; 2], numbers: &[Number], results: &[(String, Simulation)]) 
     }
 }
 
+/// Machines by area and raster time; those that no other beats in both are named, and joined by a line.
+pub fn pareto(machines: &[(String, Config)], results: &[(String, Simulation)]) -> String {
+    let places: Vec<_> = machines
+        .iter()
+        .zip(results)
+        .map(|((_, config), (_, result))| [area::area(config).added, result.stages.raster])
+        .collect();
+    let front = scatter::pareto(&places);
+    let point = |(index, (name, result)): (usize, &(String, Simulation))| Point {
+        at: places[index],
+        name: format!("{name}: {:.2} mJ", result.energy.total()),
+        labelled: front.contains(&index) && front.len() <= 12,
+        color: if front.contains(&index) {
+            COLORS[1]
+        } else {
+            "#bbb"
+        },
+    };
+    let line = Line {
+        through: front.iter().map(|&index| places[index]).collect(),
+        name: String::new(),
+        color: COLORS[1],
+    };
+    let axis = |name: &str| Axis {
+        name: name.to_owned(),
+        logarithmic: false,
+    };
+    let plot = Plot {
+        size: [760, 480],
+        axes: [
+            axis("mm2 that Gaussians add, arithmetic alone"),
+            axis("raster stage, ms"),
+        ],
+        points: results.iter().enumerate().map(point).collect(),
+        lines: vec![line],
+    };
+    plot.svg()
+}
+
+/// The stages under the roofs of the shader cores and of the rasterizer: operations a second over operations a byte.
+pub fn roofline(frame: &FrameWork, result: &Simulation, config: &Config) -> String {
+    let bandwidth = config.memory.bandwidth_gb_s * config.memory.efficiency;
+    let shader = &config.shader;
+    let cores =
+        f64::from(shader.sms) * shader.float_per_cycle * shader.clock_ghz * shader.efficiency;
+    let of = |operations: Operations| {
+        (operations.add + operations.mul + operations.div + operations.exp) as f64
+    };
+    let raster = &config.rasterizer;
+    let pes = f64::from(raster.pes()) * raster.clock_ghz * of(Operations::GAUSSIAN);
+    let mut points = Vec::new();
+    let mut point = |name: &str, operations: f64, bytes: f64, ms: f64, color| {
+        if operations > 0.0 && bytes > 0.0 && ms > 0.0 {
+            points.push(Point {
+                at: [operations / bytes, operations / ms * 1e-6],
+                name: name.to_owned(),
+                labelled: true,
+                color,
+            });
+        }
+    };
+    let stages = frame.shader();
+    let names = ["dispatches", "stage 1", "stage 2", "fragment programs"];
+    let rooflines = [
+        &result.compute,
+        &result.preprocess,
+        &result.sort,
+        &result.shade,
+    ];
+    for ((name, work), roofline) in names.iter().zip(&stages).zip(rooflines) {
+        point(
+            name,
+            work.operations(),
+            work.bytes,
+            roofline.milliseconds(),
+            COLORS[0],
+        );
+    }
+    let report = &result.raster_alone;
+    let operations = report.gaussian_evaluations * of(Operations::GAUSSIAN)
+        + report.triangle_evaluations * of(Operations::TRIANGLE);
+    let bytes = report.bytes_in + report.bytes_out;
+    point(
+        "stage 3",
+        operations,
+        bytes,
+        result.stages_alone.raster,
+        COLORS[1],
+    );
+    // From a byte's roof to the units' roof, and beyond the points.
+    let most = points.iter().map(|point| point.at[0]).fold(100.0, f64::max);
+    let least = points.iter().map(|point| point.at[0]).fold(0.1, f64::min);
+    let roof = |name: &str, peak: f64, color| Line {
+        through: vec![
+            [least, least * bandwidth],
+            [peak / bandwidth, peak],
+            [(peak / bandwidth).max(most) * 2.0, peak],
+        ],
+        name: format!("{name}: {peak:.0} G operations/s"),
+        color,
+    };
+    let mut lines = vec![roof("shader cores", cores, COLORS[0])];
+    if raster.modules > 0 {
+        lines.push(roof("rasterizer", pes, COLORS[1]));
+    }
+    let axis = |name: String| Axis {
+        name,
+        logarithmic: true,
+    };
+    let plot = Plot {
+        size: [760, 480],
+        axes: [
+            axis(format!(
+                "operations a byte of main memory ({bandwidth:.0} GB/s)"
+            )),
+            axis("G operations/s".to_owned()),
+        ],
+        points,
+        lines,
+    };
+    plot.svg()
+}
+
+/// Pixels of the picture of a frame's tiles, at most.
+const WIDEST: f64 = 1280.0;
+
+/// A frame's tiles as squares, the darker the more cycles they take; the cycles are each square's title.
+pub fn tiles(frame: &FrameWork, spans: &[TileSpan], config: &Config) -> String {
+    let [width, height] = frame.size.map(f64::from);
+    let scale = (WIDEST / width.max(1.0)).min(1.0);
+    let side = f64::from(config.rasterizer.tile_side) * scale;
+    let most = spans
+        .iter()
+        .map(|span| span.end - span.begin)
+        .fold(1.0, f64::max);
+    let [width, height] = [width * scale, height * scale];
+    let mut out = String::new();
+    // Writing to a string cannot fail.
+    let _ = writeln!(
+        out,
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width:.0}\" height=\"{height:.0}\" viewBox=\"0 0 {width:.0} {height:.0}\">\n\
+         <title>Cycles of each tile; the darkest takes {most:.0}</title>\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>"
+    );
+    for span in spans {
+        let cycles = span.end - span.begin;
+        let [x, y] = span.at.map(|at| f64::from(at) * side);
+        // From white over orange to dark red.
+        let share = cycles / most;
+        let [r, g, b] = [
+            255.0 - 120.0 * share.powi(3),
+            255.0 * (1.0 - share),
+            220.0 * (1.0 - share).powi(2),
+        ];
+        let _ = writeln!(
+            out,
+            "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{side:.1}\" height=\"{side:.1}\" fill=\"rgb({r:.0},{g:.0},{b:.0})\">\
+             <title>{},{}: {cycles:.0} cycles</title></rect>",
+            span.at[0], span.at[1]
+        );
+    }
+    out + "</svg>\n"
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -75,5 +247,31 @@ mod tests {
         for word in ["none", "tile", "row", "modules", "whole frame"] {
             assert!(svg.contains(&format!(">{word}</text>")), "{word}");
         }
+    }
+
+    #[test]
+    fn other_plots_show_every_machine_stage_and_tile() {
+        let mut frame = even_frame([320, 200], 20_000, 0.3);
+        frame.draws[0].sort = timing::work::ShaderWork {
+            integer: 1e6,
+            bytes: 1e6,
+            ..Default::default()
+        };
+        let machines: Vec<_> = ["modules=2", "modules=4", "modules=8"]
+            .map(|setting| {
+                let config = Config::preset("paper-15x16", &[setting.to_owned()]);
+                (setting.to_owned(), config.expect("a preset"))
+            })
+            .into();
+        let of = |(name, config): &(String, Config)| (name.clone(), simulate(&frame, config));
+        let results: Vec<_> = machines.iter().map(of).collect();
+        assert_eq!(pareto(&machines, &results).matches("<circle").count(), 3);
+        let (config, result) = (&machines[0].1, &results[0].1);
+        let roofs = roofline(&frame, result, config);
+        assert!(roofs.contains(">stage 2</text>") && roofs.contains(">stage 3</text>"));
+        assert_eq!(roofs.matches("<polyline").count(), 2);
+        let (_, spans) = timing::fast::rasterize_tiles(&frame, config, 0.0);
+        let picture = tiles(&frame, &spans, config);
+        assert_eq!(picture.matches(" cycles</title>").count(), 260);
     }
 }

@@ -3,11 +3,12 @@
 use comfy_table::presets::UTF8_FULL_CONDENSED;
 use comfy_table::{CellAlignment, ContentArrangement, Table};
 use timing::Config;
+use timing::fast::TileSpan;
 use timing::raster::RasterReport;
 use timing::simulate::Simulation;
 use timing::work::{FrameWork, TileWork};
-use timing_studies::area;
 use timing_studies::paper::Section;
+use timing_studies::{area, rivals, simt};
 
 fn new_table() -> Table {
     let mut table = Table::new();
@@ -33,7 +34,7 @@ fn share(part: f64, whole: f64) -> String {
 }
 
 /// Everything about one machine.
-pub fn one(frame: &FrameWork, result: &Simulation, config: &Config) -> String {
+pub fn one(frame: &FrameWork, result: &Simulation, config: &Config, spans: &[TileSpan]) -> String {
     let mut table = new_table();
     let mut last = "";
     let mut row = |group: &'static str, name: &str, value: String, note: String| {
@@ -136,6 +137,17 @@ pub fn one(frame: &FrameWork, result: &Simulation, config: &Config) -> String {
         format!("{:.1} GB/s", result.contention_gb_s),
         none(),
     );
+    if let Some(longest) = longest(spans) {
+        let cycles = longest.end - longest.begin;
+        let part = cycles / result.raster_alone.cycles.max(1.0);
+        let alone = share(part, 1.0) + " of the stage";
+        row("tiles", "longest", format!("{cycles:.0} cycles"), alone);
+        if part > MOST_OF_THE_TIME {
+            let [x, y] = longest.at;
+            let note = "takes most of the stage: more modules would wait for it".to_owned();
+            row("tiles", "warning", format!("tile {x},{y}"), note);
+        }
+    }
     row(
         "memory",
         "not counted",
@@ -166,6 +178,29 @@ pub fn one(frame: &FrameWork, result: &Simulation, config: &Config) -> String {
         format!("{:.2}x", result.speedup),
         none(),
     );
+    if result.raster.gaussian_evaluations > 0.0 {
+        let squares = frame.with_squares();
+        let threads = simt::simulate(&squares, config);
+        let note = format!(
+            "{} of the warps blend; tail {}",
+            share(threads.blended, 1.0),
+            ms(threads.tail_ms)
+        );
+        row(
+            "baseline",
+            "as a SIMT machine",
+            ms(threads.milliseconds()),
+            note,
+        );
+        let quads = rivals::quads(frame, config);
+        let note = format!("{:.0} fragments; {} limits", quads.fragments, quads.limit());
+        row(
+            "baseline",
+            "as blended quads",
+            ms(quads.milliseconds()),
+            note,
+        );
+    }
     let gains = &result.gains;
     for (name, factor, note) in [
         ("raster speed-up", result.raster_speedup, "product of:"),
@@ -212,6 +247,15 @@ pub fn one(frame: &FrameWork, result: &Simulation, config: &Config) -> String {
     );
     right(&mut table, 2..3);
     format!("{table}\n")
+}
+
+/// The share of the stage above which a tile is most of it.
+const MOST_OF_THE_TIME: f64 = 0.5;
+
+/// The tile that takes most cycles.
+fn longest(spans: &[TileSpan]) -> Option<&TileSpan> {
+    let cycles = |span: &TileSpan| span.end - span.begin;
+    spans.iter().max_by(|a, b| cycles(a).total_cmp(&cycles(b)))
 }
 
 /// The main numbers of a result, and their names.
@@ -316,11 +360,12 @@ fn field(text: &str) -> String {
     }
 }
 
-/// A line for each machine.
-pub fn csv(results: &[(String, Simulation)]) -> String {
+/// A line for each machine, with its area in mm2 where there is one for each.
+pub fn csv(results: &[(String, Simulation)], areas: &[f64]) -> String {
     let mut out = String::new();
     for (index, (name, result)) in results.iter().enumerate() {
-        let summary = summary(result);
+        let mut summary = summary(result).to_vec();
+        summary.extend(areas.get(index).map(|&area| ("added mm2", area, 3)));
         if index == 0 {
             let names: Vec<_> = summary.iter().map(|(name, ..)| *name).collect();
             out += &format!("machine,{}\n", names.join(","));
@@ -387,7 +432,14 @@ mod tests {
         let frame = even_frame([320, 200], 50_000, 0.3);
         let config = Config::preset("paper-15x16", &[]).expect("a preset");
         let result = simulate(&frame, &config);
-        let text = one(&frame, &result, &config);
+        let (_, spans) = timing::fast::rasterize_tiles(&frame, &config, 0.0);
+        let text = one(&frame, &result, &config, &spans);
+        assert!(!text.contains("warning"), "{text}");
+        let alone = [TileSpan {
+            end: result.raster_alone.cycles,
+            ..spans[0]
+        }];
+        assert!(one(&frame, &result, &config, &alone).contains("takes most of the stage"));
         let result_gains = result.gains;
         for part in [
             "320 x 200",
@@ -419,8 +471,10 @@ mod tests {
         let gains = result_gains.hardware * result_gains.stalls;
         assert_eq!(cell("raster speed-up", 2), format!("{gains:.2}x"));
         assert_eq!(cell("dependency", 3), "0.0 % of a frame alone");
-        assert_eq!(csv(&results).lines().count(), 3);
-        assert!(csv(&results).contains("\"a,b\","));
+        let lines = csv(&results, &[1.0, 2.5]);
+        assert_eq!(lines.lines().count(), 3);
+        assert!(lines.contains("\"a,b\",") && lines.contains(",2.5\n"));
+        assert!(!csv(&results, &[]).contains("mm2"));
         assert!(many(&results).contains("raster speed-up"));
         let sections = timing_studies::paper::report();
         assert!(paper(&sections).contains("GSCore"));

@@ -300,6 +300,25 @@ fn a_query_counts_what_the_model_says_of_the_trace() {
             (Counter::SimulatedShade, total(|r| r.stages.shade * 1e6)),
             (Counter::SimulatedRasterCycles, total(|r| r.raster.cycles)),
             (Counter::SimulatedBusy, total(|r| r.raster.modules.busy)),
+            (
+                Counter::SimulatedDependency,
+                total(|r| r.raster.modules.dependency),
+            ),
+            (
+                Counter::SimulatedMemoryStall,
+                total(|r| r.raster.modules.memory),
+            ),
+            (
+                Counter::SimulatedController,
+                total(|r| r.raster.modules.controller),
+            ),
+            (
+                Counter::SimulatedModeSwitch,
+                total(|r| r.raster.modules.mode_switch),
+            ),
+            (Counter::SimulatedIdle, total(|r| r.raster.modules.idle)),
+            (Counter::SimulatedBytesIn, total(|r| r.raster.bytes_in)),
+            (Counter::SimulatedBytesOut, total(|r| r.raster.bytes_out)),
             (Counter::SimulatedSwitches, total(|r| r.raster.switches)),
             (
                 Counter::SimulatedArithmeticEnergy,

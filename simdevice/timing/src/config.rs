@@ -58,6 +58,8 @@ pub struct Rasterizer {
     pub triangle_latency: u32,
     /// Cycles from a pixel's transmittance to its next one: two Gaussians that share a pixel cannot begin closer.
     pub carried_latency: u32,
+    /// The share of Gaussians that share a group of pixels with the one before them, where their groups are too few to say.
+    pub neighbour_sharing: f64,
     /// Whether opacity is folded into the exponent; if not, a Gaussian takes a multiplication more than there are
     /// multipliers, and its interval is one cycle longer.
     pub opacity_folded: bool,
@@ -127,13 +129,17 @@ impl Rasterizer {
 
     /// Cycles in which the PEs wait for a pixel's transmittance after a primitive that is evaluated in `groups` of `open`
     /// groups of 16 pixels. Triangles carry none. Two Gaussians that need not share a pixel, since each takes at most half
-    /// of the open groups, do not wait for each other; this is a lower bound.
+    /// of the open groups, wait for the share of their cycles that [`Self::neighbour_sharing`] says, whole ones.
     pub fn waiting_cycles(&self, mode: Mode, groups: u64, open: u64) -> u64 {
-        let must_share = 2 * groups > open;
-        if mode == Mode::Triangle || groups == 0 || !must_share {
+        if mode == Mode::Triangle || groups == 0 {
             return 0;
         }
-        u64::from(self.carried_latency).saturating_sub(self.busy_cycles(mode, groups))
+        let most = u64::from(self.carried_latency).saturating_sub(self.busy_cycles(mode, groups));
+        let must_share = 2 * groups > open;
+        if must_share {
+            return most;
+        }
+        (most as f64 * self.neighbour_sharing).round() as u64
     }
 
     /// Cycles of the controller for a primitive of which no pixel is evaluated.
@@ -375,6 +381,7 @@ const RANGES: &[(&str, &str, Range)] = {
         ("rasterizer", "gaussian_latency", From(0.0, 10_000.0)),
         ("rasterizer", "triangle_latency", From(0.0, 10_000.0)),
         ("rasterizer", "carried_latency", From(0.0, 10_000.0)),
+        ("rasterizer", "neighbour_sharing", From(0.0, 1.0)),
         ("rasterizer", "tile_side", OneOf(&TILE_SIDES)),
         ("rasterizer", "batch", From(1.0, 65_536.0)),
         ("rasterizer", "numbers_in", From(1.0, 256.0)),
@@ -717,9 +724,14 @@ mod tests {
         let raster = Config::preset("paper-15x16", &[]).unwrap().rasterizer;
         let waits = |mode, groups, open| raster.waiting_cycles(mode, groups, open);
         assert_eq!(waits(Mode::Gaussian, 16, 16), 0, "16 groups hide it");
-        assert_eq!(waits(Mode::Gaussian, 2, 2), 4, "both have both blocks");
-        assert_eq!(waits(Mode::Gaussian, 2, 3), 4, "two of three are shared");
-        assert_eq!(waits(Mode::Gaussian, 2, 4), 0, "they may be apart");
+        assert_eq!(waits(Mode::Gaussian, 2, 2), 5, "both have both blocks");
+        assert_eq!(waits(Mode::Gaussian, 2, 3), 5, "two of three are shared");
+        assert_eq!(waits(Mode::Gaussian, 2, 4), 3, "half of them are apart");
+        let apart = Rasterizer {
+            neighbour_sharing: 0.0,
+            ..raster.clone()
+        };
+        assert_eq!(apart.waiting_cycles(Mode::Gaussian, 2, 4), 0, "all are");
         assert_eq!(waits(Mode::Gaussian, 0, 16), 0);
         assert_eq!(waits(Mode::Triangle, 2, 2), 0, "no transmittance");
         assert_eq!([0, 1].map(Rasterizer::looking_cycles), [1, 0]);

@@ -12,8 +12,30 @@ use crate::raster::RasterReport;
 use crate::work::{FrameWork, Mode, Segment};
 use std::collections::VecDeque;
 
+/// A tile in a module, from the first primitive that is evaluated to the last.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TileSpan {
+    /// The module, from 0.
+    pub module: usize,
+    /// Column and row of the tile.
+    pub at: [u32; 2],
+    /// Cycles from the first fetch of all.
+    pub begin: f64,
+    /// The same.
+    pub end: f64,
+}
+
 /// Rasterizes a frame while others move `others_gb_s` to and from main memory.
 pub fn rasterize(frame: &FrameWork, config: &Config, others_gb_s: f64) -> RasterReport {
+    rasterize_tiles(frame, config, others_gb_s).0
+}
+
+/// The same, with what each module was at: of each module its tiles in order, module after module.
+pub fn rasterize_tiles(
+    frame: &FrameWork,
+    config: &Config,
+    others_gb_s: f64,
+) -> (RasterReport, Vec<TileSpan>) {
     let tasks = plan::tasks(frame, &config.rasterizer);
     let rates = Rates::new(config, others_gb_s);
     let mut report = RasterReport::default();
@@ -57,7 +79,12 @@ pub fn rasterize(frame: &FrameWork, config: &Config, others_gb_s: f64) -> Raster
     let lasted: f64 = modules.iter().map(|module| module.lasted).sum();
     report.modules.memory = (lasted - evaluation).max(0.0);
     report.modules.idle = now * modules.len() as f64 - report.modules.total();
-    report
+    let spans = |(module, drawn): (usize, Module)| {
+        let span = move |span: TileSpan| TileSpan { module, ..span };
+        drawn.spans.into_iter().map(span)
+    };
+    let spans = modules.into_iter().enumerate().flat_map(spans).collect();
+    (report, spans)
 }
 
 /// What is left of a module's step, its port apart.
@@ -97,6 +124,12 @@ struct Batches {
 
 #[derive(Debug)]
 struct Module {
+    /// Cycles from the first fetch of all.
+    now: f64,
+    /// Tiles that were claimed and whose evaluation has not begun.
+    places: VecDeque<[u32; 2]>,
+    /// Tiles of which evaluation began, the last of which may not have ended.
+    spans: Vec<TileSpan>,
     rates: Rates,
     contended: bool,
     claimed: VecDeque<Batches>,
@@ -114,6 +147,9 @@ struct Module {
 impl Module {
     fn new(rates: Rates, contended: bool) -> Self {
         Self {
+            now: 0.0,
+            places: VecDeque::new(),
+            spans: Vec::new(),
             rates,
             contended,
             claimed: VecDeque::new(),
@@ -167,6 +203,7 @@ impl Module {
 
     /// Lets `cycles` pass.
     fn advance(&mut self, cycles: f64, share: f64) {
+        self.now += cycles;
         let blocked = self.step.is_some_and(|step| self.is_blocked(&step));
         if let Some(step) = &mut self.step {
             self.lasted += cycles;
@@ -233,6 +270,7 @@ impl Module {
             && let Some(task) = queue.next()
         {
             self.claimed = self.batches(task, raster, report);
+            self.places.push_back(task.at);
         }
         let next = self.claimed.pop_front();
         let before = std::mem::replace(&mut self.current, next);
@@ -254,6 +292,17 @@ impl Module {
         self.tile_ended = before
             .filter(|batch| batch.last_of_tile)
             .map(|batch| batch.mode);
+        if before.is_some_and(|batch| batch.first_of_tile)
+            && let Some(at) = self.places.pop_front()
+        {
+            let (module, begin, end) = (0, self.now, self.now);
+            self.spans.push(TileSpan {
+                module,
+                at,
+                begin,
+                end,
+            });
+        }
         if before.is_some() || next.is_some() {
             self.step = Some(Step {
                 cycles: before.map_or(0.0, |batch| batch.cycles),
@@ -265,6 +314,9 @@ impl Module {
     /// The write of a tile whose last batch has just been evaluated.
     fn end_tile(&mut self, raster: &Rasterizer, report: &mut RasterReport) -> Option<Request> {
         let mode = self.tile_ended.take()?;
+        if let Some(span) = self.spans.last_mut() {
+            span.end = self.now;
+        }
         let bytes = f64::from(raster.tile_bytes());
         report.bytes_out += bytes;
         // The last pixels must leave the pipeline first.
@@ -402,5 +454,32 @@ fn part_batches(
             first_of_tile: false,
             last_of_tile: false,
         });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::even_frame;
+    use std::collections::HashSet;
+
+    #[test]
+    fn every_tile_is_in_one_module_at_a_time() {
+        let frame = even_frame([320, 200], 20_000, 0.3);
+        let config = Config::preset("paper-15x16", &[]).unwrap();
+        let (report, spans) = rasterize_tiles(&frame, &config, 0.0);
+        assert_eq!(report, rasterize(&frame, &config, 0.0));
+        let places: HashSet<_> = spans.iter().map(|span| span.at).collect();
+        assert_eq!((spans.len(), places.len()), (260, 260));
+        for pair in spans
+            .windows(2)
+            .filter(|pair| pair[0].module == pair[1].module)
+        {
+            assert!(pair[0].end <= pair[1].begin);
+        }
+        let in_tiles: f64 = spans.iter().map(|span| span.end - span.begin).sum();
+        let modules = &report.modules;
+        assert!(in_tiles >= modules.busy && in_tiles <= modules.total() + 1e-6);
+        assert!(spans.iter().all(|span| span.end <= report.cycles + 1e-6));
     }
 }

@@ -10,6 +10,8 @@ use std::collections::{BTreeMap, HashMap};
 /// What one module does without interruption: all draws of a tile.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Task {
+    /// Column and row of the tile, in tiles of the hardware's size.
+    pub at: [u32; 2],
     /// Draws, in order.
     pub parts: Vec<Part>,
 }
@@ -46,7 +48,8 @@ pub fn tasks(frame: &FrameWork, raster: &Rasterizer) -> Vec<Task> {
                 continue;
             }
             let place = *places.entry(at).or_insert_with(|| {
-                tasks.push(Task { parts: Vec::new() });
+                let parts = Vec::new();
+                tasks.push(Task { at, parts });
                 tasks.len() - 1
             });
             if let Some(task) = tasks.get_mut(place) {

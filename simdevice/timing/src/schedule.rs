@@ -220,17 +220,44 @@ struct Event {
 #[derive(Clone, Debug, Serialize)]
 #[serde(rename_all = "lowercase")]
 enum Arguments {
-    Name(&'static str),
+    Name(String),
     Frame(usize),
 }
 
+/// What a module is at on the timeline.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModuleSpan {
+    /// The module, from 0.
+    pub module: usize,
+    /// The frame, from 0.
+    pub frame: usize,
+    /// Column and row of its tile.
+    pub at: [u32; 2],
+    /// When it begins, in ms.
+    pub begin_ms: f64,
+    /// When it ends, in ms.
+    pub end_ms: f64,
+}
+
+/// The tracks of modules begin with this one.
+const FIRST_MODULE: u32 = 10;
+
 /// The timeline, with `other_data` beside it.
 pub fn chrome_trace<T: Serialize>(spans: &[Span], other_data: T) -> ChromeTrace<T> {
+    chrome_trace_of_modules(spans, &[], other_data)
+}
+
+/// The timeline with a row per module, too, on which each tile is a span.
+pub fn chrome_trace_of_modules<T: Serialize>(
+    spans: &[Span],
+    modules: &[ModuleSpan],
+    other_data: T,
+) -> ChromeTrace<T> {
     let track = |engine: Engine| match engine {
         Engine::ShaderCores => 1,
         Engine::Rasterizer => 2,
     };
-    let named = |kind: &str, tid, name| Event {
+    let named = |kind: &str, tid, name: String| Event {
         name: kind.to_owned(),
         ph: "M",
         pid: 1,
@@ -240,9 +267,13 @@ pub fn chrome_trace<T: Serialize>(spans: &[Span], other_data: T) -> ChromeTrace<
         dur: None,
         args: Arguments::Name(name),
     };
-    let mut trace_events = vec![named("process_name", 0, "GauRast")];
+    let mut trace_events = vec![named("process_name", 0, "GauRast".to_owned())];
     for engine in [Engine::ShaderCores, Engine::Rasterizer] {
-        trace_events.push(named("thread_name", track(engine), engine.name()));
+        trace_events.push(named(
+            "thread_name",
+            track(engine),
+            engine.name().to_owned(),
+        ));
     }
     trace_events.extend(spans.iter().map(|span| Event {
         name: format!("{} {}", span.stage, span.frame),
@@ -250,6 +281,25 @@ pub fn chrome_trace<T: Serialize>(spans: &[Span], other_data: T) -> ChromeTrace<
         pid: 1,
         tid: track(span.engine),
         cat: Some(span.stage),
+        ts: Some(span.begin_ms * 1e3),
+        dur: Some((span.end_ms - span.begin_ms) * 1e3),
+        args: Arguments::Frame(span.frame),
+    }));
+    let count = modules
+        .iter()
+        .map(|span| span.module + 1)
+        .max()
+        .unwrap_or(0);
+    for module in 0..count {
+        let track = FIRST_MODULE + module as u32;
+        trace_events.push(named("thread_name", track, format!("module {module}")));
+    }
+    trace_events.extend(modules.iter().map(|span| Event {
+        name: format!("tile {},{}", span.at[0], span.at[1]),
+        ph: "X",
+        pid: 1,
+        tid: FIRST_MODULE + span.module as u32,
+        cat: Some("tile"),
         ts: Some(span.begin_ms * 1e3),
         dur: Some((span.end_ms - span.begin_ms) * 1e3),
         args: Arguments::Frame(span.frame),

@@ -392,22 +392,182 @@ fn a_scene_is_simulated_from_the_work_that_was_done() {
     let timeline = std::fs::read(folder.path().join("t.json")).expect("a timeline");
     let timeline: serde_json::Value = serde_json::from_slice(&timeline).expect("JSON");
     let events = timeline["traceEvents"].as_array().expect("events");
-    assert_eq!(
-        events.iter().filter(|event| event["ph"] == "X").count(),
-        6 * 3
+    let spans = |tiles: bool| {
+        let spans = events.iter().filter(|event| event["ph"] == "X");
+        spans
+            .filter(|event| (event["cat"] == "tile") == tiles)
+            .count()
+    };
+    assert_eq!(spans(false), 6 * 3);
+    // Each tile with something in it is on a module's row, in each frame.
+    assert!(spans(true) > 0 && spans(true).is_multiple_of(6));
+    let tracks = events.iter().filter(|event| event["ph"] == "M");
+    assert!(
+        tracks
+            .filter(|event| event["args"]["name"] == "module 0")
+            .count()
+            == 1
     );
     let sweep = ["--sweep", "modules=1..4", "--format", "csv"];
     let sweep = simulate(&[&sweep[..], &["--plot", "s.svg"]].concat());
     assert_eq!(sweep.lines().count(), 5, "{sweep}");
     let plot = std::fs::read_to_string(folder.path().join("s.svg")).expect("a plot");
     assert!(plot.contains("speed-up over the shader cores"));
+    let grid = [
+        "--sweep",
+        "modules=1..4",
+        "--sweep",
+        "batch=16,32,64",
+        "--format",
+        "csv",
+    ];
+    let plots = [
+        "--pareto",
+        "p.svg",
+        "--roofline",
+        "r.svg",
+        "--tiles",
+        "f.svg",
+    ];
+    let grid = simulate(&[&grid[..], &plots].concat());
+    assert_eq!(grid.lines().count(), 13, "{grid}");
+    assert!(grid.contains("added mm2") && grid.contains("modules=4 batch=64,"));
+    let svg = |name: &str| std::fs::read_to_string(folder.path().join(name)).expect("a plot");
+    assert_eq!(svg("p.svg").matches("<circle").count(), 12);
+    assert!(svg("r.svg").contains(">stage 3</text>"));
+    assert_eq!(
+        svg("f.svg").matches(" cycles</title>").count(),
+        spans(true) / 6
+    );
+    let every = simulate(&["--every-frame", "--format", "csv"]);
+    assert!(
+        every
+            .lines()
+            .nth(1)
+            .is_some_and(|line| line.starts_with("frame 0,"))
+    );
     let compared = simulate(&["--stepped"]);
     assert!(compared.contains("+0.000 %"), "{compared}");
     assert!(simulate(&["--what-if"]).contains("blocks saturate"));
     assert!(simulate(&[]).contains("stage 3, raster"));
-    // Only the timeline and the plot were asked for.
+    // Only the timeline and the plots were asked for.
     let files = std::fs::read_dir(folder.path()).expect("readable").count();
-    assert_eq!(files, 3);
+    assert_eq!(files, 6);
+}
+
+#[gaurast_runner::test]
+fn counters_of_a_rendering_and_a_simulation_agree() {
+    let folder = folder();
+    let last = ONE.lines().last().expect("a Gaussian");
+    let others: String = (0..40)
+        .map(|k| {
+            last.replacen(
+                "0 0 3",
+                &format!("{} {} {}", k % 7 - 3, k % 5 - 2, 3 + k % 4),
+                1,
+            ) + "\n"
+        })
+        .collect();
+    let scene = ONE.replace("vertex 1", "vertex 41") + &others;
+    write(&folder, "scene.ply", &scene);
+    let rendered = [
+        "render",
+        "scene.ply",
+        "-o",
+        "a.png",
+        "--size",
+        "320x200",
+        "--counters",
+    ];
+    let output = gaurast(&folder, &rendered);
+    assert!(output.status.success());
+    let table = String::from_utf8_lossy(&output.stdout).into_owned();
+    // Whole numbers, of which digits stand in groups of three.
+    let counter = |name: &str| -> f64 {
+        let row = table.lines().find(|line| {
+            let mut cells = line.split('┆').map(|cell| cell.trim_matches(['│', ' ']));
+            cells.nth(1) == Some(name)
+        });
+        let row = row.unwrap_or_else(|| panic!("{name}: {table}"));
+        let value = row.split('┆').next_back().unwrap_or_default();
+        let digits: String = value.chars().filter(char::is_ascii_digit).collect();
+        digits.parse().expect("a number")
+    };
+    let simulated = [
+        "simulate",
+        "scene.ply",
+        "--size",
+        "320x200",
+        "--set",
+        "collaborative=false",
+        "--every-frame",
+        "--format",
+        "json",
+    ];
+    let output = gaurast(&folder, &simulated);
+    assert!(output.status.success());
+    let frames: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let frames = frames.as_array().expect("frames");
+    let sum = |of: &dyn Fn(&serde_json::Value) -> f64| {
+        frames.iter().map(|frame| of(&frame[1])).sum::<f64>()
+    };
+    let raster =
+        |field: &'static str| sum(&|result| result["raster"][field].as_f64().expect("a number"));
+    let cause = |field: &'static str| {
+        sum(&|result| {
+            result["raster"]["modules"][field]
+                .as_f64()
+                .expect("a number")
+        })
+    };
+    let energy = |field: &'static str| {
+        sum(&|result| result["energy"][field].as_f64().expect("a number")) * 1e6
+    };
+    for (name, expected) in [
+        ("raster cycles", raster("cycles")),
+        ("PE busy", cause("busy")),
+        ("PE stall, dependency", cause("dependency")),
+        ("PE stall, memory", cause("memory")),
+        ("PE stall, controller", cause("controller")),
+        ("PE stall, mode switch", cause("mode_switch")),
+        ("PE idle", cause("idle")),
+        ("mode switches", raster("switches")),
+        ("bytes fetched", raster("bytes_in")),
+        ("bytes written", raster("bytes_out")),
+        ("energy, PE arithmetic", energy("arithmetic")),
+        ("energy, main memory", energy("memory")),
+    ] {
+        let counted = counter(name);
+        assert!(
+            (counted - expected).abs() <= 1.0 + frames.len() as f64,
+            "{name}: {counted} {expected}"
+        );
+    }
+    assert!(cause("busy") > 0.0 && cause("memory") > 0.0);
+}
+
+#[gaurast_runner::test]
+fn the_rasterizer_module_is_written_as_systemverilog() {
+    let folder = folder();
+    let output = gaurast(&folder, &["simulate", "--emit-rtl", "rtl"]);
+    assert!(output.status.success() && output.stdout.is_empty());
+    let read =
+        |name: &str| std::fs::read_to_string(folder.path().join("rtl").join(name)).expect(name);
+    for name in [
+        "raster_module",
+        "pe",
+        "fp_add",
+        "fp_mul",
+        "fp_div",
+        "fp_exp2",
+        "exp2_table",
+    ] {
+        assert!(
+            read(&format!("{name}.sv")).contains(&format!("module {name} #(")),
+            "{name}"
+        );
+    }
+    assert!(read("area.sh").contains("yosys") && read("bench.cpp").contains("Vraster_module"));
 }
 
 #[gaurast_runner::test]
@@ -425,6 +585,17 @@ fn what_cannot_be_simulated_is_said() {
     fails(
         &["--sweep", "modules=3..1"],
         "gaurast: --sweep modules=3..1",
+    );
+    fails(
+        &[
+            "--sweep",
+            "modules=1..64",
+            "--sweep",
+            "batch=1..64",
+            "--sweep",
+            "numbers_in=1..64",
+        ],
+        "gaurast: --sweep: 262144 machines",
     );
     fails(&["bad.json"], "gaurast: bad.json: not a trace of work");
     fails(&["missing.ply"], "gaurast: drawing the scene: missing.ply");

@@ -5,9 +5,17 @@
 
 pub mod area;
 pub mod chart;
+pub mod exponential;
+pub mod module;
+pub mod number;
 pub mod paper;
 pub mod pe;
+pub mod rivals;
+pub mod rtl;
+pub mod rtl_cycles;
+pub mod scatter;
 pub mod scene;
 pub mod sensitivity;
+pub mod simt;
 pub mod stepped;
 pub mod what_if;

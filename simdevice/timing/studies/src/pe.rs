@@ -1,21 +1,24 @@
-//! A processing element that computes real pixels and counts what it did: the adders, multipliers, divider and
-//! exponential unit are methods, and every number goes through one of them. Nothing here is read from a table, so the
-//! counts can be held against the paper's Table II.
+//! The processing element: the adders, multipliers, divider and exponential unit are methods that compute the bits of
+//! [`crate::number`] and [`crate::exponential`], and every number goes through one of them. Nothing here is read from a
+//! table, so the counts can be held against the paper's Table II; `rtl/pe.sv` computes the same bits.
 //!
 //! The paper says how many units a PE has, not how they are wired. This is one wiring that needs exactly those:
 //!
-//! - **Triangle**, 9 numbers in: the planes of u/w, v/w and 1/w over the screen, 3 each. Out: u, v and depth.
+//! - **Triangle**, 9 numbers in: the planes of u/w, v/w and 1/w over the tile, 3 each. Out: u, v and depth.
 //! - **Gaussian**, 9 numbers in: mean (2), the three coefficients of the exponent, log-opacity, colour (3). Opacity is
 //!   folded into the exponent; with the opacity as a factor there would be 11 multiplications on 10 multipliers. The
-//!   two thresholds are subtractions on the adders. Out: colour; transmittance stays in the tile buffer.
+//!   exponent is to the base 2, so that the exponential needs no multiplication by log2(e). The two thresholds are
+//!   subtractions on the adders. Out: colour; transmittance stays in the tile buffer.
 
+use crate::exponential::{self, Exponential};
+use crate::number::Format;
 use timing::pe::Operations;
 
-/// A plane over the screen: `[x, y, 1]` times the coefficients.
-pub type Plane = [f32; 3];
+/// A plane over the tile: `[x, y, 1]` times the coefficients.
+pub type Plane = [u32; 3];
 
-/// The nine numbers of a triangle.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// The nine numbers of a triangle. Places are counted from the tile's corner, in pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Triangle {
     /// u/w, the second vertex's weight over w.
     pub u: Plane,
@@ -25,91 +28,161 @@ pub struct Triangle {
     pub w: Plane,
 }
 
-/// The nine numbers of a Gaussian.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Gaussian {
-    /// Pixels.
-    pub mean: [f32; 2],
-    /// Of dx^2, dx dy and dy^2 in the exponent.
-    pub exponent: [f32; 3],
-    /// The natural logarithm of the opacity.
-    pub log_opacity: f32,
-    /// Red, green, blue.
-    pub color: [f32; 3],
+impl Triangle {
+    /// The triangle in numbers of a format.
+    pub fn new(format: Format, [u, v, w]: [[f32; 3]; 3]) -> Self {
+        let plane = |plane: [f32; 3]| plane.map(|value| format.number(value));
+        let [u, v, w] = [u, v, w].map(plane);
+        Self { u, v, w }
+    }
+
+    /// The numbers in the order in which a list in memory has them.
+    pub fn numbers(&self) -> [u32; 9] {
+        let Self { u, v, w } = self;
+        [u[0], u[1], u[2], v[0], v[1], v[2], w[0], w[1], w[2]]
+    }
 }
 
-/// What a pixel of the tile buffer holds in Gaussian mode.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// The nine numbers of a Gaussian.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Gaussian {
+    /// Pixels from the tile's corner.
+    pub mean: [u32; 2],
+    /// Of dx^2, dx dy and dy^2 in the exponent, to the base 2.
+    pub exponent: [u32; 3],
+    /// The opacity's logarithm to the base 2.
+    pub log_opacity: u32,
+    /// Red, green, blue.
+    pub color: [u32; 3],
+}
+
+impl Gaussian {
+    /// The Gaussian in numbers of a format; its exponent is to the base e, and its opacity a factor.
+    pub fn new(
+        format: Format,
+        mean: [f32; 2],
+        exponent: [f32; 3],
+        opacity: f32,
+        color: [f32; 3],
+    ) -> Self {
+        let of = |value| format.number(value);
+        Self {
+            mean: mean.map(of),
+            exponent: exponent.map(|value| of(value * std::f32::consts::LOG2_E)),
+            log_opacity: of(opacity.log2()),
+            color: color.map(of),
+        }
+    }
+
+    /// The numbers in the order in which a list in memory has them: each where a triangle's is that goes to the same unit.
+    pub fn numbers(&self) -> [u32; 9] {
+        let ([mx, my], [a, b, c], [red, green, blue]) = (self.mean, self.exponent, self.color);
+        [a, b, mx, c, my, red, green, blue, self.log_opacity]
+    }
+}
+
+/// A pixel of the tile buffer in Gaussian mode.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pixel {
     /// Accumulated colour.
-    pub color: [f32; 3],
+    pub color: [u32; 3],
     /// Transmittance.
-    pub transmittance: f32,
+    pub transmittance: u32,
     /// Whether no Gaussian may change it any more.
     pub finished: bool,
 }
 
-impl Default for Pixel {
-    fn default() -> Self {
+impl Pixel {
+    /// A pixel that nothing has touched.
+    pub fn new(format: Format) -> Self {
         Self {
-            color: [0.0; 3],
-            transmittance: 1.0,
+            color: [0; 3],
+            transmittance: format.one(),
             finished: false,
         }
     }
 }
 
-/// The thresholds of a draw.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// The thresholds of a draw, as positive numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Thresholds {
     /// Least alpha that contributes.
-    pub alpha_floor: f32,
+    pub alpha_floor: u32,
     /// Greatest alpha.
-    pub alpha_ceiling: f32,
+    pub alpha_ceiling: u32,
     /// Least transmittance.
-    pub transmittance_floor: f32,
+    pub transmittance_floor: u32,
 }
 
-/// What a triangle gives a pixel that it covers.
-#[derive(Clone, Copy, Debug, PartialEq)]
+impl Thresholds {
+    /// Those of the original 3DGS code.
+    pub fn new(format: Format) -> Self {
+        Self {
+            alpha_floor: format.number(1.0 / 255.0),
+            alpha_ceiling: format.number(0.99),
+            transmittance_floor: format.number(1e-4),
+        }
+    }
+}
+
+/// The weights and depth that a triangle gives a pixel that it covers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fragment {
     /// The second vertex's weight, perspective-correct.
-    pub u: f32,
+    pub u: u32,
     /// The third vertex's weight.
-    pub v: f32,
+    pub v: u32,
     /// Depth.
-    pub depth: f32,
+    pub depth: u32,
 }
 
 /// A processing element.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Pe {
-    /// What it has done.
+    /// The layout of its numbers.
+    pub format: Format,
+    /// Its exponential unit's design.
+    pub exponential: Exponential,
+    /// Operations done.
     pub operations: Operations,
 }
 
 impl Pe {
-    fn add(&mut self, a: f32, b: f32) -> f32 {
+    /// A processing element that has done nothing.
+    pub fn new(format: Format, exponential: Exponential) -> Self {
+        Self {
+            format,
+            exponential,
+            operations: Operations::default(),
+        }
+    }
+
+    fn add(&mut self, a: u32, b: u32) -> u32 {
         self.operations.add += 1;
-        a + b
+        self.format.add(a, b)
     }
 
-    fn mul(&mut self, a: f32, b: f32) -> f32 {
+    fn sub(&mut self, a: u32, b: u32) -> u32 {
+        self.operations.add += 1;
+        self.format.sub(a, b)
+    }
+
+    fn mul(&mut self, a: u32, b: u32) -> u32 {
         self.operations.mul += 1;
-        a * b
+        self.format.mul(a, b)
     }
 
-    fn div(&mut self, a: f32, b: f32) -> f32 {
+    fn div(&mut self, a: u32, b: u32) -> u32 {
         self.operations.div += 1;
-        a / b
+        self.format.div(a, b)
     }
 
-    fn exp(&mut self, a: f32) -> f32 {
+    fn exp2(&mut self, a: u32) -> u32 {
         self.operations.exp += 1;
-        a.exp()
+        exponential::exp2(self.format, self.exponential, a)
     }
 
-    fn plane(&mut self, plane: Plane, [x, y]: [f32; 2]) -> f32 {
+    fn plane(&mut self, plane: Plane, [x, y]: [u32; 2]) -> u32 {
         let along = self.mul(plane[0], x);
         let down = self.mul(plane[1], y);
         let sum = self.add(along, down);
@@ -121,32 +194,35 @@ impl Pe {
     pub fn triangle(
         &mut self,
         triangle: &Triangle,
-        at: [f32; 2],
-        depth: [f32; 2],
+        at: [u32; 2],
+        depth: [u32; 2],
     ) -> Option<Fragment> {
         let u = self.plane(triangle.u, at);
         let v = self.plane(triangle.v, at);
         let inverse_w = self.plane(triangle.w, at);
-        let w = self.div(1.0, inverse_w);
+        let w = self.div(self.format.one(), inverse_w);
         let (u, v) = (self.mul(u, w), self.mul(v, w));
-        let rest = self.add(1.0, -u);
-        let rest = self.add(rest, -v);
+        let rest = self.sub(self.format.one(), u);
+        let rest = self.sub(rest, v);
         let scaled = self.mul(depth[1], inverse_w);
         let depth = self.add(depth[0], scaled);
         // Coverage is in the signs.
-        (u >= 0.0 && v >= 0.0 && rest >= 0.0).then_some(Fragment { u, v, depth })
+        let outside = [u, v, rest]
+            .into_iter()
+            .any(|weight| self.format.is_negative(weight));
+        (!outside).then_some(Fragment { u, v, depth })
     }
 
     /// Blends a Gaussian into a pixel with this centre; returns whether it contributed.
     pub fn gaussian(
         &mut self,
         g: &Gaussian,
-        at: [f32; 2],
+        at: [u32; 2],
         thresholds: &Thresholds,
         pixel: &mut Pixel,
     ) -> bool {
-        let dx = self.add(at[0], -g.mean[0]);
-        let dy = self.add(at[1], -g.mean[1]);
+        let dx = self.sub(at[0], g.mean[0]);
+        let dy = self.sub(at[1], g.mean[1]);
         let along = self.mul(g.exponent[0], dx);
         let across = self.mul(g.exponent[1], dy);
         let sum = self.add(along, across);
@@ -155,14 +231,17 @@ impl Pe {
         let second = self.mul(down, dy);
         let power = self.add(first, second);
         let power = self.add(power, g.log_opacity);
-        let alpha = self.exp(power).min(thresholds.alpha_ceiling);
-        let reaches = self.add(alpha, -thresholds.alpha_floor) >= 0.0;
+        // Both are positive, and compare as integers.
+        let alpha = self.exp2(power).min(thresholds.alpha_ceiling);
+        let below = self.sub(alpha, thresholds.alpha_floor);
+        let reaches = !self.format.is_negative(below);
 
         let t = pixel.transmittance;
         let weight = self.mul(t, alpha);
-        let rest = self.add(1.0, -alpha);
+        let rest = self.sub(self.format.one(), alpha);
         let rest = self.mul(t, rest);
-        let open = self.add(rest, -thresholds.transmittance_floor) >= 0.0;
+        let below = self.sub(rest, thresholds.transmittance_floor);
+        let open = !self.format.is_negative(below);
         let mut color = pixel.color;
         for (channel, value) in color.iter_mut().zip(g.color) {
             let product = self.mul(weight, value);
@@ -185,35 +264,36 @@ impl Pe {
 mod tests {
     use super::*;
 
-    const THRESHOLDS: Thresholds = Thresholds {
-        alpha_floor: 1.0 / 255.0,
-        alpha_ceiling: 0.99,
-        transmittance_floor: 1e-4,
-    };
+    const SINGLE: Format = Format::SINGLE;
+
+    fn pe() -> Pe {
+        Pe::new(SINGLE, Exponential::Table)
+    }
 
     fn gaussians() -> Vec<Gaussian> {
         (0..40)
             .map(|k| {
                 let k = k as f32;
                 let (a, c) = (0.02 + 0.001 * k, 0.05 - 0.0008 * k);
-                Gaussian {
-                    mean: [(k * 3.7) % 16.0, (k * 5.3) % 16.0],
-                    exponent: [-0.5 * a, -0.01, -0.5 * c],
-                    log_opacity: (0.2 + 0.02 * k).ln(),
-                    color: [0.5 + 0.01 * k, 0.3, 1.0 - 0.02 * k],
-                }
+                Gaussian::new(
+                    SINGLE,
+                    [(k * 3.7) % 16.0, (k * 5.3) % 16.0],
+                    [-0.5 * a, -0.01, -0.5 * c],
+                    0.2 + 0.02 * k,
+                    [0.5 + 0.01 * k, 0.3, 1.0 - 0.02 * k],
+                )
             })
             .collect()
     }
 
     /// The same in binary64, straight from the definition.
-    fn reference(gaussians: &[Gaussian], at: [f32; 2]) -> ([f64; 3], f64) {
+    fn reference(gaussians: &[Gaussian], at: [u32; 2]) -> ([f64; 3], f64) {
         let (mut color, mut t) = ([0.0; 3], 1.0);
         for g in gaussians {
-            let [dx, dy] = [0, 1].map(|k| f64::from(at[k]) - f64::from(g.mean[k]));
-            let [a, b, c] = g.exponent.map(f64::from);
-            let opacity = f64::from(g.log_opacity).exp();
-            let alpha = (opacity * (a * dx * dx + b * dx * dy + c * dy * dy).exp()).min(0.99);
+            let [dx, dy] = [0, 1].map(|k| SINGLE.value(at[k]) - SINGLE.value(g.mean[k]));
+            let [a, b, c] = g.exponent.map(|value| SINGLE.value(value));
+            let opacity = SINGLE.value(g.log_opacity).exp2();
+            let alpha = (opacity * (a * dx * dx + b * dx * dy + c * dy * dy).exp2()).min(0.99);
             if alpha < 1.0 / 255.0 {
                 continue;
             }
@@ -221,7 +301,7 @@ mod tests {
                 break;
             }
             for (sum, value) in color.iter_mut().zip(g.color) {
-                *sum += t * alpha * f64::from(value);
+                *sum += t * alpha * SINGLE.value(value);
             }
             t *= 1.0 - alpha;
         }
@@ -230,16 +310,17 @@ mod tests {
 
     #[test]
     fn a_gaussian_takes_11_additions_10_multiplications_and_an_exponential() {
-        let mut pe = Pe::default();
+        let mut pe = pe();
         let gaussians = gaussians();
         let mut contributions = 0;
         for y in 0..16 {
             for x in 0..16 {
-                let at = [x as f32 + 0.5, y as f32 + 0.5];
-                let mut pixel = Pixel::default();
+                let at = [x, y].map(|c| SINGLE.number(c as f32 + 0.5));
+                let mut pixel = Pixel::new(SINGLE);
                 for g in &gaussians {
                     let before = pe.operations;
-                    contributions += u32::from(pe.gaussian(g, at, &THRESHOLDS, &mut pixel));
+                    contributions +=
+                        u32::from(pe.gaussian(g, at, &Thresholds::new(SINGLE), &mut pixel));
                     let after = pe.operations;
                     let spent = Operations {
                         add: after.add - before.add,
@@ -252,11 +333,11 @@ mod tests {
                 let (color, t) = reference(&gaussians, at);
                 for (ours, theirs) in pixel.color.iter().zip(color) {
                     assert!(
-                        (f64::from(*ours) - theirs).abs() < 2e-6,
+                        (SINGLE.value(*ours) - theirs).abs() < 2e-6,
                         "{pixel:?} {color:?}"
                     );
                 }
-                assert!((f64::from(pixel.transmittance) - t).abs() < 2e-6);
+                assert!((SINGLE.value(pixel.transmittance) - t).abs() < 2e-6);
             }
         }
         assert!(contributions > 1000, "{contributions}");
@@ -266,7 +347,7 @@ mod tests {
     fn a_triangle_takes_9_additions_9_multiplications_and_a_division() {
         // Screen positions and w of three vertices; weights and depth by solving for the planes in binary64.
         let vertices = [[1.1, 2.2, 1.0], [14.3, 3.4, 2.0], [5.7, 15.2, 4.0]];
-        let plane = |values: [f64; 3]| -> Plane {
+        let plane = |values: [f64; 3]| -> [f32; 3] {
             let [[x0, y0, _], [x1, y1, _], [x2, y2, _]] = vertices;
             let area = (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0);
             let [d1, d2] = [values[1] - values[0], values[2] - values[0]];
@@ -275,18 +356,22 @@ mod tests {
             [a, b, values[0] - a * x0 - b * y0].map(|value| value as f32)
         };
         let inverse = vertices.map(|[_, _, w]: [f64; 3]| 1.0 / w);
-        let triangle = Triangle {
-            u: plane([0.0, inverse[1], 0.0]),
-            v: plane([0.0, 0.0, inverse[2]]),
-            w: plane(inverse),
-        };
-        let mut pe = Pe::default();
+        let triangle = Triangle::new(
+            SINGLE,
+            [
+                plane([0.0, inverse[1], 0.0]),
+                plane([0.0, 0.0, inverse[2]]),
+                plane(inverse),
+            ],
+        );
+        let mut pe = pe();
         let mut covered = 0;
         for y in 0..16u8 {
             for x in 0..16u8 {
                 let at = [f64::from(x) + 0.5, f64::from(y) + 0.5];
                 pe.operations = Operations::default();
-                let fragment = pe.triangle(&triangle, at.map(|c| c as f32), [0.25, 0.5]);
+                let depth = [0.25, 0.5].map(|value| SINGLE.number(value));
+                let fragment = pe.triangle(&triangle, at.map(|c| SINGLE.number(c as f32)), depth);
                 assert_eq!(pe.operations, Operations::TRIANGLE);
                 // Weights on the screen, then over w.
                 let weight = |a: [f64; 3], b: [f64; 3]| {
@@ -300,10 +385,10 @@ mod tests {
                     covered += 1;
                     let over: Vec<_> = screen.iter().zip(inverse).map(|(s, i)| s * i).collect();
                     let sum: f64 = over.iter().sum();
-                    assert!((f64::from(fragment.u) - over[1] / sum).abs() < 1e-5);
-                    assert!((f64::from(fragment.v) - over[2] / sum).abs() < 1e-5);
+                    assert!((SINGLE.value(fragment.u) - over[1] / sum).abs() < 1e-5);
+                    assert!((SINGLE.value(fragment.v) - over[2] / sum).abs() < 1e-5);
                     let depth = 0.25 + 0.5 * sum / screen.iter().sum::<f64>();
-                    assert!((f64::from(fragment.depth) - depth).abs() < 1e-6);
+                    assert!((SINGLE.value(fragment.depth) - depth).abs() < 1e-6);
                 }
             }
         }
@@ -312,21 +397,18 @@ mod tests {
 
     #[test]
     fn only_what_contributes_changes_a_pixel() {
-        let mut pe = Pe::default();
-        let mut pixel = Pixel::default();
-        let opaque = Gaussian {
-            mean: [0.5, 0.5],
-            exponent: [-0.5, 0.0, -0.5],
-            log_opacity: 0.95f32.ln(),
-            color: [1.0; 3],
-        };
-        assert!(!pe.gaussian(&opaque, [9.5, 0.5], &THRESHOLDS, &mut pixel));
-        assert_eq!(pixel, Pixel::default());
+        let mut pe = pe();
+        let mut pixel = Pixel::new(SINGLE);
+        let at = |x: f32| [SINGLE.number(x), SINGLE.number(0.5)];
+        let opaque = Gaussian::new(SINGLE, [0.5, 0.5], [-0.5, 0.0, -0.5], 0.95, [1.0; 3]);
+        let thresholds = Thresholds::new(SINGLE);
+        assert!(!pe.gaussian(&opaque, at(9.5), &thresholds, &mut pixel));
+        assert_eq!(pixel, Pixel::new(SINGLE));
         for _ in 0..3 {
-            assert!(pe.gaussian(&opaque, [0.5, 0.5], &THRESHOLDS, &mut pixel));
+            assert!(pe.gaussian(&opaque, at(0.5), &thresholds, &mut pixel));
         }
         let before = pixel;
-        assert!(!pe.gaussian(&opaque, [0.5, 0.5], &THRESHOLDS, &mut pixel));
+        assert!(!pe.gaussian(&opaque, at(0.5), &thresholds, &mut pixel));
         assert!(pixel.finished && pixel.color == before.color);
     }
 }

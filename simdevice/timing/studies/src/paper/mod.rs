@@ -6,6 +6,7 @@ mod generated;
 mod headlines;
 mod numbers;
 mod predicted;
+mod rivals;
 mod scenes;
 mod table;
 
@@ -15,6 +16,7 @@ pub use table::{Label, Row, Section};
 pub fn report() -> Vec<Section> {
     let mut sections: Vec<_> = predicted::section().into_iter().collect();
     sections.push(scenes::left_out());
+    sections.extend(rivals::sections().into_iter().flatten());
     sections.extend(headlines::sections());
     sections.extend(scenes::sections());
     sections.push(numbers::inputs());
@@ -32,7 +34,8 @@ The paper is Li, Keller, Lin and Khailany, \"GauRast: Enhancing GPU Triangle Ras
 Splatting\", DAC 2025 (arXiv 2503.16681). Labels say where the model's number comes from: **input**, the paper says it and
 the model uses it; **cited**, another source says it; **assumed**, nobody does; **calibrated**, a constant of the model was chosen so that it comes out; **solved**, it follows from
 the paper's numbers by arithmetic; **predicted**, the model says it without having been told; **illustration**, it is of
-generated scenes that have the published counts and sizes and nothing else of the paper's.
+generated scenes that have the published counts and sizes and nothing else of the paper's; **not testable**, it would need what is
+not at hand.
 
 No trained model of the Mip-NeRF 360 scenes is used here, so pairs of tiles and Gaussians are solved from the published
 times, not measured. A prediction from them tests the model's overheads and its energy, not the scenes' work.

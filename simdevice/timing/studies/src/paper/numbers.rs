@@ -105,7 +105,12 @@ pub fn inputs() -> Section {
         Row::without_paper("shader cores, maximum mode", "8 SM, 918 MHz", Label::Cited, "NVIDIA's power mode table"),
         Row::without_paper("bandwidth, maximum mode", "102.4 GB/s", Label::Cited, "NVIDIA's data sheet"),
         Row::without_paper("tile side", "16 pixels", Label::Cited, "the original 3DGS code; that the hardware's tiles are as large is assumed"),
-        Row::without_paper("cycles between pixels of a PE", "1", Label::Assumed, "the paper counts a PE's units, not its cycles"),
+        Row::without_paper(
+            "cycles between pixels of a PE",
+            "1",
+            Label::Solved,
+            "the paper counts a PE's units, not its cycles; studies/rtl/pe.sv has those units and begins a pixel in each cycle",
+        ),
         Row::without_paper(
             "Gaussians of the scenes",
             "1.19-6.06 M",

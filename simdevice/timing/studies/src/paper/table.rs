@@ -20,6 +20,8 @@ pub enum Label {
     Predicted,
     /// Of something else that resembles the paper's: it shows what could be, and is evidence of nothing.
     Illustration,
+    /// It would need what is not at hand.
+    Untestable,
 }
 
 impl Label {
@@ -33,6 +35,7 @@ impl Label {
             Self::Solved => "solved",
             Self::Predicted => "predicted",
             Self::Illustration => "illustration",
+            Self::Untestable => "not testable",
         }
     }
 }

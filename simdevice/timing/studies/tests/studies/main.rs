@@ -2,7 +2,10 @@
 
 mod models;
 mod paper;
+mod rtl;
 mod sensitivity;
+mod tiles;
+mod trace;
 
 fn main() -> std::process::ExitCode {
     gaurast_runner::main()

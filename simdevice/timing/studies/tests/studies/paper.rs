@@ -94,7 +94,7 @@ fn every_number_of_the_papers_evaluation_has_a_row() {
         ("bandwidth, 10 W mode", "", Label::Cited),
         ("bandwidth, maximum mode", "", Label::Cited),
         ("tile side", "", Label::Cited),
-        ("cycles between pixels of a PE", "", Label::Assumed),
+        ("cycles between pixels of a PE", "", Label::Solved),
         ("Gaussians of the scenes", "", Label::Cited),
     ];
     numbers.extend(others.map(|(item, paper, label)| (item.to_owned(), paper, label)));

@@ -1,0 +1,278 @@
+//! What else could draw Gaussians, on the same machine: as blended quads through the rasterizer that every GPU has; and what
+//! other accelerators say of themselves.
+
+use serde::Serialize;
+use timing::config::Config;
+use timing::shader_cores;
+use timing::work::{DrawWork, FrameWork, Mode, ShaderWork, TILE_GROUPS, TILE_PIXELS};
+
+/// Stage 3 by quads: each Gaussian two triangles around its ellipse, shaded by a fragment program and blended by the ROPs.
+/// Nothing ends early, for a blend is all that the hardware knows of a pixel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Quads {
+    /// Fragments that are shaded.
+    pub fragments: f64,
+    /// Milliseconds of shading vertices and fragments.
+    pub shade_ms: f64,
+    /// Milliseconds of setting up triangles.
+    pub setup_ms: f64,
+    /// Milliseconds of blending.
+    pub blend_ms: f64,
+    /// Milliseconds of main memory, where every blend hits the cache of its tile.
+    pub memory_ms: f64,
+}
+
+/// Pixels that the ROPs blend in a cycle: 16 of them in Orin NX (published estimates), 16-bit floats at half the rate
+/// (assumed).
+const BLENDS_PER_CYCLE: f64 = 8.0;
+/// Triangles that are set up in a cycle, one for each of two GPCs (assumed).
+const SETUPS_PER_CYCLE: f64 = 2.0;
+/// Bytes of a pixel of 16-bit floats.
+const PIXEL_BYTES: f64 = 8.0;
+/// Bytes of a Gaussian's instance: centre, axes, colour and opacity.
+const INSTANCE_BYTES: f64 = 36.0;
+/// Fragments shaded over those in a Gaussian's blocks of 4x4 pixels: a rectangle around an ellipse has 4/pi times its area.
+const RECTANGLE: f64 = 4.0 / std::f64::consts::PI;
+
+/// A fragment program: the form of two interpolated numbers, its test, an exponential, four outputs.
+const FRAGMENT: ShaderWork = ShaderWork {
+    float: 10.0,
+    integer: 2.0,
+    special: 1.0,
+    wide: 0.0,
+    memory: 2.0,
+    image: 0.0,
+    other: 4.0,
+    bytes: 0.0,
+};
+
+/// A vertex: a corner of the rectangle.
+const VERTEX: ShaderWork = ShaderWork {
+    float: 12.0,
+    integer: 4.0,
+    special: 0.0,
+    wide: 0.0,
+    memory: 9.0,
+    image: 0.0,
+    other: 4.0,
+    bytes: 0.0,
+};
+
+impl Quads {
+    /// Milliseconds: the units work side by side, and the slowest of them is what it takes.
+    pub fn milliseconds(&self) -> f64 {
+        [self.shade_ms, self.setup_ms, self.blend_ms, self.memory_ms]
+            .into_iter()
+            .fold(0.0, f64::max)
+    }
+
+    /// The slowest unit.
+    pub fn limit(&self) -> &'static str {
+        let units = [
+            ("shading", self.shade_ms),
+            ("setup", self.setup_ms),
+            ("blending", self.blend_ms),
+            ("main memory", self.memory_ms),
+        ];
+        let slowest = units.into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
+        slowest.map_or("", |(name, _)| name)
+    }
+}
+
+/// Pixels of the blocks that a draw's Gaussians reach, were none left out because it is finished: the lists' rests are taken
+/// to reach as many as what was looked at.
+fn pixels(draw: &DrawWork) -> f64 {
+    let tile = |tile: &timing::work::TileWork| {
+        let reached: u32 = tile
+            .runs
+            .iter()
+            .map(|run| run.reached + run.hidden_blocks)
+            .sum();
+        let listed = f64::from(tile.listed) / f64::from(tile.needed().max(1));
+        f64::from(reached) * listed * f64::from(TILE_PIXELS / TILE_GROUPS)
+    };
+    draw.tiles.iter().map(tile).sum()
+}
+
+/// Stage 3 of a frame's Gaussians by quads on the machine's GPU as it is.
+pub fn quads(frame: &FrameWork, config: &Config) -> Quads {
+    let draws = || {
+        frame
+            .draws
+            .iter()
+            .filter(|draw| draw.mode == Mode::Gaussian)
+    };
+    let fragments = draws().map(pixels).sum::<f64>() * RECTANGLE;
+    let gaussians = draws().map(|draw| draw.drawn as f64).sum::<f64>();
+    let screen = f64::from(frame.size[0]) * f64::from(frame.size[1]);
+    let mut work = FRAGMENT
+        .times(fragments)
+        .plus(&VERTEX.times(4.0 * gaussians));
+    work.bytes = INSTANCE_BYTES * gaussians + PIXEL_BYTES * screen;
+    let roofline = shader_cores::roofline(&work, &config.shader, &config.memory);
+    let cycles_per_ms = config.shader.clock_ghz * 1e6;
+    Quads {
+        fragments,
+        shade_ms: roofline.compute_ms,
+        setup_ms: 2.0 * gaussians / SETUPS_PER_CYCLE / cycles_per_ms,
+        blend_ms: fragments / BLENDS_PER_CYCLE / cycles_per_ms,
+        memory_ms: roofline.memory_ms,
+    }
+}
+
+/// A published number of another way to draw Gaussians.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Published {
+    /// Its name.
+    pub name: &'static str,
+    /// The number; empty where its source was not read.
+    pub number: &'static str,
+    /// Scenes, or that the abstract doesn't name them.
+    pub scenes: &'static str,
+    /// Resolution of the pictures.
+    pub resolution: &'static str,
+    /// What it is held against.
+    pub baseline: &'static str,
+    /// Who says so.
+    pub source: &'static str,
+}
+
+const UNREAD: &str = "the paper's own text was not read";
+
+const GSCORE: Published = Published {
+    name: "GSCore, speed-up",
+    number: "15.86x",
+    scenes: "synthetic and real-world, not named in the abstract",
+    resolution: "varying, not named in the abstract",
+    baseline: "a mobile consumer GPU",
+    source: "GSCore's abstract, ASPLOS 2024",
+};
+
+/// Published numbers, each with what it is of. None of them enters the model.
+pub const PUBLISHED: [Published; 12] = [
+    GSCORE,
+    Published {
+        name: "GSCore, area",
+        number: "3.95 mm2",
+        scenes: "",
+        resolution: "",
+        baseline: "28 nm",
+        source: "GauRast's text",
+    },
+    Published {
+        name: "GBU, speed-up of its row-by-row order on the GPU alone",
+        number: "1.72x",
+        scenes: "real-world static scenes, not named in the abstract",
+        resolution: "not named in the abstract",
+        baseline: "Jetson Orin NX, 7-17 FPS",
+        source: "GBU's abstract, HPCA 2025 (arXiv 2503.23625)",
+    },
+    Published {
+        name: "GBU, speed-up with the unit",
+        number: "",
+        scenes: "",
+        resolution: "",
+        baseline: "",
+        source: UNREAD,
+    },
+    Published {
+        name: "StreamingGS, speed-up, at most",
+        number: "45.7x",
+        scenes: "not named in the abstract",
+        resolution: "not named in the abstract",
+        baseline: "a mobile Ampere GPU (Jetson Orin NX), 2-9 FPS",
+        source: "StreamingGS's abstract, DAC 2025 (arXiv 2506.09070)",
+    },
+    Published {
+        name: "StreamingGS, energy, at most",
+        number: "62.9x",
+        scenes: "not named in the abstract",
+        resolution: "not named in the abstract",
+        baseline: "the same",
+        source: "the same",
+    },
+    Published {
+        name: "VR-Pipe, speed-up, at most",
+        number: "2.78x",
+        scenes: "synthetic and real-world, not named in the abstract",
+        resolution: "not named in the abstract",
+        baseline: "the conventional graphics pipeline: blended quads on a simulated GPU",
+        source: "VR-Pipe's abstract, HPCA 2025 (arXiv 2502.17078)",
+    },
+    Published {
+        name: "VR-Pipe, mean speed-up",
+        number: "",
+        scenes: "",
+        resolution: "",
+        baseline: "",
+        source: UNREAD,
+    },
+    Published {
+        name: "Neo, throughput over an edge GPU, at most",
+        number: "10.0x",
+        scenes: "not named in the abstract",
+        resolution: "not named in the abstract",
+        baseline: "an edge GPU",
+        source: "Neo's abstract (arXiv 2511.12930)",
+    },
+    Published {
+        name: "Neo, throughput over GSCore, at most",
+        number: "5.6x",
+        scenes: "not named in the abstract",
+        resolution: "not named in the abstract",
+        baseline: "GSCore",
+        source: "the same",
+    },
+    Published {
+        name: "Neo, DRAM traffic less than an edge GPU",
+        number: "94.5 %",
+        scenes: "not named in the abstract",
+        resolution: "not named in the abstract",
+        baseline: "an edge GPU",
+        source: "the same",
+    },
+    Published {
+        name: "Neo, area",
+        number: "",
+        scenes: "",
+        resolution: "",
+        baseline: "",
+        source: UNREAD,
+    },
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use timing::simulate::even_frame;
+
+    #[test]
+    fn quads_are_never_spared() {
+        let config = Config::preset("orin-nx-10w", &[]).unwrap();
+        let mut frame = even_frame([320, 320], 400_000, 0.2);
+        frame.draws[0].drawn = 100_000;
+        let all = quads(&frame, &config);
+        assert!((all.fragments / (400_000.0 * 256.0 * RECTANGLE) - 1.0).abs() < 1e-9);
+        // A list of which a half was looked at is drawn whole.
+        for tile in &mut frame.draws[0].tiles {
+            tile.runs[0].primitives /= 2;
+            tile.runs[0].reached /= 2;
+        }
+        let same = quads(&frame, &config);
+        assert!((same.fragments / all.fragments - 1.0).abs() < 0.01);
+        assert!(all.milliseconds() >= all.blend_ms && all.blend_ms > 0.0);
+        assert_eq!(all.limit() == "blending", all.blend_ms >= all.shade_ms);
+    }
+
+    #[test]
+    fn a_number_has_a_source_and_what_it_is_of_or_says_that_it_was_not_read() {
+        for row in PUBLISHED {
+            assert_eq!(row.number.is_empty(), row.source == UNREAD, "{}", row.name);
+            assert!(
+                row.number.is_empty() || !row.baseline.is_empty(),
+                "{}",
+                row.name
+            );
+        }
+    }
+}

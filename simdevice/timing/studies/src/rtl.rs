@@ -1,0 +1,306 @@
+//! The rasterizer module in SystemVerilog: its files, and the bench that runs it under Verilator.
+
+use crate::exponential::{Exponential, table_module};
+use crate::module::{Groups, List, Module};
+use crate::number::Format;
+use std::io::{Error, Result};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use timing::work::{Mode, TILE_GROUPS, TILE_PIXELS};
+
+/// Files of the hardware, in an order in which tools may read them.
+const HARDWARE: &[(&str, &str)] = &[
+    ("latencies.svh", include_str!("../rtl/latencies.svh")),
+    ("delay.sv", include_str!("../rtl/delay.sv")),
+    ("fp_round.sv", include_str!("../rtl/fp_round.sv")),
+    ("fp_add.sv", include_str!("../rtl/fp_add.sv")),
+    ("fp_mul.sv", include_str!("../rtl/fp_mul.sv")),
+    ("fp_div.sv", include_str!("../rtl/fp_div.sv")),
+    ("fp_exp2.sv", include_str!("../rtl/fp_exp2.sv")),
+    ("pe.sv", include_str!("../rtl/pe.sv")),
+    ("pixel_buffer.sv", include_str!("../rtl/pixel_buffer.sv")),
+    (
+        "primitive_buffer.sv",
+        include_str!("../rtl/primitive_buffer.sv"),
+    ),
+    ("raster_module.sv", include_str!("../rtl/raster_module.sv")),
+];
+
+/// Files of the benches.
+const BENCHES: &[(&str, &str)] = &[
+    ("bench.cpp", include_str!("../rtl/bench.cpp")),
+    ("units.sv", include_str!("../rtl/units.sv")),
+    ("units.cpp", include_str!("../rtl/units.cpp")),
+    ("area.sh", include_str!("../rtl/area.sh")),
+    ("README.md", include_str!("../rtl/README.md")),
+];
+
+/// The file of the exponential's table, which the model writes.
+const TABLE: &str = "exp2_table.sv";
+
+/// Names and texts of all files.
+pub fn files() -> Vec<(&'static str, String)> {
+    let given = HARDWARE.iter().chain(BENCHES);
+    let mut files: Vec<_> = given.map(|&(name, text)| (name, text.to_owned())).collect();
+    files.push((TABLE, table_module()));
+    files
+}
+
+/// Names of the modules' files, for a tool's command line.
+pub fn sources() -> Vec<&'static str> {
+    let names = HARDWARE.iter().map(|(name, _)| *name);
+    names
+        .filter(|name| name.ends_with(".sv"))
+        .chain([TABLE])
+        .collect()
+}
+
+/// Cycles until the bench's memory answers what could not be foreseen, the presets' 100 ns.
+pub const LATENCY: u32 = 100;
+
+/// Cycles of a PE, as `latencies.svh` has them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Latencies {
+    /// From a Gaussian's operands to the pixel's colour.
+    pub gaussian: u32,
+    /// From a triangle's operands to weights and depth.
+    pub triangle: u32,
+    /// Between two Gaussians of a pixel, at least.
+    pub carried: u32,
+}
+
+impl Latencies {
+    /// Those of a PE whose numbers and exponential are these.
+    pub fn of(format: Format, exponential: Exponential) -> Self {
+        let (add, mul) = (3, 3);
+        let div = (format.mantissa + 3) / 2 + 2;
+        let exp = match exponential {
+            Exponential::Table => 4,
+            Exponential::Polynomial if format.mantissa > 10 => 7,
+            Exponential::Polynomial => 5,
+        };
+        let alpha = 4 * add + 2 * mul + exp;
+        Self {
+            gaussian: alpha + 2 * add + 2 * mul,
+            triangle: mul + 2 * add + div + mul + 2 * add,
+            carried: mul + add + 1,
+        }
+    }
+
+    /// The longer of both modes.
+    pub fn longest(self) -> u32 {
+        self.gaussian.max(self.triangle)
+    }
+}
+
+/// Writes all files to a folder, which is created if need be.
+///
+/// # Errors
+/// As for writing files.
+pub fn write(folder: &Path) -> Result<()> {
+    std::fs::create_dir_all(folder)?;
+    for (name, text) in files() {
+        let path = folder.join(name);
+        // What is built of a file is as old as the file.
+        if std::fs::read_to_string(&path).is_ok_and(|there| there == text) {
+            continue;
+        }
+        std::fs::write(path, text)?;
+    }
+    Ok(())
+}
+
+/// Builds a program of a top module and its bench by Verilator; returns its path.
+fn build(folder: &Path, top: &str, format: Format, parameters: &[String]) -> Result<PathBuf> {
+    write(folder)?;
+    let objects = format!("{top}{}", format.bits());
+    let mut command = Command::new("verilator");
+    command
+        .current_dir(folder)
+        .args([
+            "--cc",
+            "--exe",
+            "--build",
+            "-O3",
+            "-Wno-WIDTH",
+            "--Mdir",
+            &objects,
+        ])
+        .args([
+            "-CFLAGS",
+            "-O1",
+            "-MAKEFLAGS",
+            "OPT_FAST=-O1 OPT_SLOW=-O0 OPT_GLOBAL=-O1",
+        ])
+        .args(["--top-module", top])
+        .arg(format!("-GEXPONENT={}", format.exponent))
+        .arg(format!("-GMANTISSA={}", format.mantissa))
+        .args(parameters)
+        .args(sources());
+    match top {
+        "units" => command.args(["units.sv", "units.cpp"]),
+        _ => command.arg("bench.cpp"),
+    };
+    let output = command.output()?;
+    if !output.status.success() {
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        return Err(Error::other(format!("verilator: {said}")));
+    }
+    Ok(folder.join(objects).join(format!("V{top}")))
+}
+
+/// Runs a bench on words, and returns words.
+fn run(program: &Path, words: &[u32]) -> Result<Vec<u32>> {
+    let folder = program.parent().unwrap_or(Path::new("."));
+    let unique = format!("{}-{:?}", std::process::id(), std::thread::current().id());
+    let [input, output] = ["in", "out"].map(|name| folder.join(format!("{name}-{unique}")));
+    let bytes: Vec<_> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+    std::fs::write(&input, bytes)?;
+    let status = Command::new(program).args([&input, &output]).status();
+    let bytes = std::fs::read(&output);
+    let _ = std::fs::remove_file(&input);
+    let _ = std::fs::remove_file(&output);
+    if !status?.success() {
+        return Err(Error::other(format!("{}: failed", program.display())));
+    }
+    let words = bytes?;
+    Ok(words
+        .chunks_exact(4)
+        .map(|word| {
+            word.iter()
+                .rev()
+                .fold(0, |all, &byte| all << 8 | u32::from(byte))
+        })
+        .collect())
+}
+
+/// Every unit in every design, under Verilator.
+#[derive(Debug)]
+pub struct UnitBench(PathBuf);
+
+impl UnitBench {
+    /// Builds the units for a format in a folder, which keeps what was built.
+    ///
+    /// # Errors
+    /// Where there is no Verilator or it refuses.
+    pub fn build(folder: &Path, format: Format) -> Result<Self> {
+        build(folder, "units", format, &[]).map(Self)
+    }
+
+    /// Sum, sum by two paths, product, product by Booth's digits, quotient, power by the table and by the polynomial (of the
+    /// first) of each pair.
+    ///
+    /// # Errors
+    /// Where the program cannot be run.
+    pub fn run(&self, pairs: &[[u32; 2]]) -> Result<Vec<[u32; 7]>> {
+        let words = run(&self.0, pairs.as_flattened())?;
+        let (results, _) = words.as_chunks();
+        Ok(results.to_vec())
+    }
+}
+
+/// A rasterizer module under Verilator.
+#[derive(Debug)]
+pub struct ModuleBench {
+    program: PathBuf,
+    format: Format,
+}
+
+/// What a module did.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rasterized {
+    /// Cycles until nothing was left.
+    pub cycles: u32,
+    /// Cycles of the PEs: nothing to do, a pixel each, waiting for a transmittance, for memory, for the controller, changing
+    /// modes.
+    pub causes: [u32; 6],
+    /// Cycles of a pixel on its way, at most.
+    pub latency: u32,
+    /// The pixels of each list, as [`crate::module::Drawn::pixels`].
+    pub pixels: Vec<Vec<[u32; 3]>>,
+}
+
+impl ModuleBench {
+    /// Builds a module for a format in a folder, which keeps what was built; `parameters` as Verilator takes them.
+    ///
+    /// # Errors
+    /// Where there is no Verilator or it refuses.
+    pub fn build(folder: &Path, format: Format, parameters: &[String]) -> Result<Self> {
+        let program = build(folder, "raster_module", format, parameters)?;
+        Ok(Self { program, format })
+    }
+
+    /// Draws lists one after the other on a module, whose memory answers a request that could not be foreseen after
+    /// `latency` cycles.
+    ///
+    /// # Errors
+    /// Where the program cannot be run.
+    pub fn run(&self, lists: &[List], module: &Module, latency: u32) -> Result<Rasterized> {
+        let thresholds = &module.thresholds;
+        let mut words = vec![
+            lists.len() as u32,
+            latency,
+            thresholds.alpha_floor,
+            thresholds.alpha_ceiling,
+            thresholds.transmittance_floor,
+            module.depth[0],
+            module.depth[1],
+            u32::from(module.groups == Groups::Blocks),
+            if module.skips_groups { 2 } else { 1 },
+        ];
+        let mut memory = Vec::new();
+        for list in lists {
+            let count = list.primitives.len() as u32;
+            words.extend([
+                u32::from(list.mode == Mode::Gaussian),
+                memory.len() as u32,
+                count,
+            ]);
+            self.store(list, &mut memory);
+        }
+        let (memory, _) = memory.as_chunks();
+        words.extend(memory.iter().map(|&bytes| u32::from_le_bytes(bytes)));
+        let out = run(&self.program, &words)?;
+        let (head, beats) = out
+            .split_first_chunk::<8>()
+            .ok_or_else(|| Error::other("the bench wrote nothing"))?;
+        let &[cycles, a, b, c, d, e, f, latency] = head;
+        let per_tile = (TILE_PIXELS * 3 * self.format.bits() / 32) as usize;
+        Ok(Rasterized {
+            cycles,
+            causes: [a, b, c, d, e, f],
+            latency,
+            pixels: beats
+                .chunks(per_tile)
+                .map(|tile| self.pixels(tile))
+                .collect(),
+        })
+    }
+
+    /// Appends a list to memory, and room up to a multiple of 16 bytes.
+    fn store(&self, list: &List, memory: &mut Vec<u8>) {
+        let bytes = self.format.bits() as usize / 8;
+        for primitive in &list.primitives {
+            memory.extend(u32::from(primitive.groups()).to_le_bytes());
+            for number in primitive.numbers() {
+                memory.extend(&number.to_le_bytes()[..bytes]);
+            }
+        }
+        memory.resize(memory.len().next_multiple_of(16), 0);
+    }
+
+    /// A tile's pixels from what was written: groups, of each the first numbers of all its pixels, then the second ones.
+    fn pixels(&self, tile: &[u32]) -> Vec<[u32; 3]> {
+        let bits = self.format.bits() as usize;
+        let number = |index: usize| {
+            let word = tile.get(index * bits / 32).copied().unwrap_or_default();
+            word >> (index * bits % 32) & (u32::MAX >> (32 - bits))
+        };
+        let lanes = (TILE_PIXELS / TILE_GROUPS) as usize;
+        let pixel = |index: usize| {
+            let (group, lane) = (index / lanes, index % lanes);
+            [0, 1, 2].map(|which| number((group * 3 + which) * lanes + lane))
+        };
+        (0..TILE_PIXELS as usize).map(pixel).collect()
+    }
+}

@@ -1,0 +1,147 @@
+//! Cycles of the module in SystemVerilog beside those of the stepped model, for the same lists.
+
+use crate::exponential::Exponential;
+use crate::module::{Drawn, Groups, List, Module};
+use crate::number::Format;
+use crate::rtl::{LATENCY, ModuleBench, Rasterized};
+use crate::stepped;
+use std::io::{Error, Result};
+use timing::FrameWork;
+use timing::config::{Config, ConfigError};
+use timing::raster::RasterReport;
+use timing::work::{DrawWork, TileWork};
+
+/// A way to run the module.
+#[derive(Clone, Copy, Debug)]
+pub struct Setting {
+    /// Its name in a table.
+    pub name: &'static str,
+    /// Its groups.
+    pub groups: Groups,
+    /// Whether primitives are evaluated in groups that they reach, and groups of finished pixels are left out.
+    pub masked: bool,
+    /// A seed for its lists.
+    pub seed: u64,
+}
+
+impl Setting {
+    /// The paper's way, and two that leave groups out.
+    pub const ALL: [Self; 3] = [
+        Self {
+            name: "whole tiles",
+            groups: Groups::Rows,
+            masked: false,
+            seed: 1,
+        },
+        Self {
+            name: "blocks that are reached and open",
+            groups: Groups::Blocks,
+            masked: true,
+            seed: 2,
+        },
+        Self {
+            name: "rows that are reached and open",
+            groups: Groups::Rows,
+            masked: true,
+            seed: 3,
+        },
+    ];
+
+    /// The model of the module.
+    pub fn module(&self, format: Format) -> Module {
+        let mut module = Module::new(format, Exponential::Table, self.groups);
+        module.skips_groups = self.masked;
+        module
+    }
+}
+
+/// Cycles of both for the same lists.
+#[derive(Clone, Debug)]
+pub struct Cycles {
+    rasterized: Rasterized,
+    stepped: RasterReport,
+    /// Pixels in which the two differ.
+    pub different_pixels: usize,
+    /// Lists.
+    pub tiles: usize,
+    /// Cycles of a pixel on its way through the module's PEs, with the register of its operands.
+    pub latency: u32,
+}
+
+impl Cycles {
+    /// Runs both.
+    ///
+    /// # Errors
+    /// Where the bench cannot be run.
+    pub fn of(
+        bench: &ModuleBench,
+        setting: Setting,
+        format: Format,
+        lists: &[List],
+    ) -> Result<Self> {
+        let module = setting.module(format);
+        let rasterized = bench.run(lists, &module, LATENCY)?;
+        let drawn: Vec<_> = lists.iter().map(|list| module.draw(list)).collect();
+        let config = machine(format).map_err(Error::other)?;
+        let pairs = rasterized.pixels.iter().zip(&drawn);
+        let different = |(ours, drawn): (&Vec<[u32; 3]>, &Drawn)| {
+            let pairs = ours.iter().zip(&drawn.pixels);
+            pairs.filter(|(ours, theirs)| ours != theirs).count()
+        };
+        Ok(Self {
+            different_pixels: pairs.map(different).sum(),
+            tiles: lists.len(),
+            latency: rasterized.latency,
+            stepped: stepped::rasterize(&frame(lists, &drawn), &config, 0.0),
+            rasterized,
+        })
+    }
+
+    /// Cycles of the module and of the model: all, a pixel for each PE, waiting for a transmittance, for memory, for the
+    /// controller, changing modes.
+    pub fn by_cause(&self) -> [[f64; 2]; 6] {
+        let modules = &self.stepped.modules;
+        let [_, busy, dependency, memory, controller, modes] =
+            self.rasterized.causes.map(f64::from);
+        [
+            [f64::from(self.rasterized.cycles), self.stepped.cycles],
+            [busy, modules.busy],
+            [dependency, modules.dependency],
+            [memory, modules.memory],
+            [controller, modules.controller],
+            [modes, modules.mode_switch],
+        ]
+    }
+}
+
+/// One module of these numbers whose port alone limits. What a list's primitives are evaluated in is in its runs.
+fn machine(format: Format) -> std::result::Result<Config, ConfigError> {
+    let base = match format {
+        Format::HALF => "fp16",
+        _ => "paper-15x16",
+    };
+    let settings = [
+        "modules=1",
+        "bandwidth_gb_s=1000",
+        "saturation=reached",
+        "triangle_traversal=reached",
+    ];
+    Config::preset(base, &settings.map(str::to_owned))
+}
+
+/// The work of lists one after the other, each a tile of its own.
+fn frame(lists: &[List], drawn: &[Drawn]) -> FrameWork {
+    let draw = |(index, (list, drawn)): (usize, (&List, &Drawn))| DrawWork {
+        mode: list.mode,
+        tiles: vec![TileWork {
+            at: [index as u32, 0],
+            ..drawn.work.clone()
+        }],
+        ..DrawWork::default()
+    };
+    FrameWork {
+        size: [16 * lists.len() as u32, 16],
+        draws: lists.iter().zip(drawn).enumerate().map(draw).collect(),
+        ..FrameWork::default()
+    }
+}

@@ -1,0 +1,310 @@
+//! Plots of points and lines over two numbers as SVG, on linear or logarithmic axes.
+
+use std::fmt::Write;
+
+/// Room around the axes in pixels: left, top, right, bottom.
+const ROOM: [f64; 4] = [68.0, 16.0, 24.0, 48.0];
+/// Marks of a linear axis, about.
+const MARKS: f64 = 6.0;
+
+/// An axis.
+#[derive(Clone, Debug)]
+pub struct Axis {
+    /// Its name.
+    pub name: String,
+    /// Whether each step is ten times the one before.
+    pub logarithmic: bool,
+}
+
+/// A point with a name, which a reader sees beside it or, where there is none to see, when pointing at it.
+#[derive(Clone, Debug)]
+pub struct Point {
+    /// Across and up.
+    pub at: [f64; 2],
+    /// Its name.
+    pub name: String,
+    /// Whether the name is written beside it.
+    pub labelled: bool,
+    /// A colour of SVG.
+    pub color: &'static str,
+}
+
+/// A line through places.
+#[derive(Clone, Debug)]
+pub struct Line {
+    /// Places, across and up.
+    pub through: Vec<[f64; 2]>,
+    /// Its name, written at its last place.
+    pub name: String,
+    /// A colour of SVG.
+    pub color: &'static str,
+}
+
+/// A plot.
+#[derive(Clone, Debug)]
+pub struct Plot {
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    /// Across and up.
+    pub axes: [Axis; 2],
+    /// Points; those that are no finite numbers, or not positive on a logarithmic axis, are left out.
+    pub points: Vec<Point>,
+    /// Lines, below the points; the same.
+    pub lines: Vec<Line>,
+}
+
+/// Least and greatest place of an axis, and places of its marks with their names; of a logarithmic one, logarithms.
+struct Scale {
+    range: [f64; 2],
+    marks: Vec<(f64, String)>,
+}
+
+impl Axis {
+    /// The place of a value before it is scaled to pixels.
+    fn place(&self, value: f64) -> f64 {
+        if self.logarithmic {
+            value.log10()
+        } else {
+            value
+        }
+    }
+
+    fn scale(&self, values: impl Iterator<Item = f64>) -> Scale {
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for value in values
+            .map(|value| self.place(value))
+            .filter(|value| value.is_finite())
+        {
+            (low, high) = (low.min(value), high.max(value));
+        }
+        if low > high {
+            (low, high) = (0.0, 1.0);
+        }
+        if self.logarithmic {
+            let range = [low.floor(), high.ceil().max(low.floor() + 1.0)];
+            let decades = range[0] as i32..=range[1] as i32;
+            let mark = |power: i32| (f64::from(power), decade(power));
+            return Scale {
+                range,
+                marks: decades.map(mark).collect(),
+            };
+        }
+        let room = ((high - low) * 0.05).max(high.abs() * 1e-3).max(1e-9);
+        let (low, high) = (low - room, high + room);
+        let rough = (high - low) / MARKS;
+        let power = 10f64.powf(rough.log10().floor());
+        let factor = [1.0, 2.0, 5.0, 10.0]
+            .into_iter()
+            .find(|factor| factor * power >= rough);
+        let step = factor.unwrap_or(10.0) * power;
+        let decimals = (-step.log10().floor()).max(0.0) as usize;
+        let first = (low / step).ceil();
+        let count = ((high / step).floor() - first).max(0.0) as usize + 1;
+        let mark = |index: usize| {
+            let value = (first + index as f64) * step;
+            (value, format!("{value:.decimals$}"))
+        };
+        Scale {
+            range: [low, high],
+            marks: (0..count).map(mark).collect(),
+        }
+    }
+}
+
+/// The name of a power of ten.
+fn decade(power: i32) -> String {
+    match power {
+        0..=3 => format!("{}", 10i64.pow(power as u32)),
+        _ => format!("1e{power}"),
+    }
+}
+
+/// Text with what SVG reads otherwise replaced.
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+}
+
+impl Plot {
+    /// The plot as SVG.
+    pub fn svg(&self) -> String {
+        let mut out = String::new();
+        // Writing to a string cannot fail.
+        let _ = self.write(&mut out);
+        out
+    }
+
+    fn write(&self, out: &mut String) -> std::fmt::Result {
+        let [width, height] = self.size;
+        writeln!(
+            out,
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
+             font-family=\"sans-serif\" font-size=\"12\">\n<rect width=\"{width}\" height=\"{height}\" fill=\"white\"/>"
+        )?;
+        let [width, height] = self.size.map(f64::from);
+        let values = |axis: usize| {
+            let points = self.points.iter().map(move |point| point.at[axis]);
+            let lines = self.lines.iter().flat_map(|line| &line.through);
+            points.chain(lines.map(move |place| place[axis]))
+        };
+        let scales = [self.axes[0].scale(values(0)), self.axes[1].scale(values(1))];
+        let [left, top, right, bottom] = ROOM;
+        let (base, end) = (height - bottom, width - right);
+        let share = |axis: usize, place: f64| {
+            let [low, high] = scales[axis].range;
+            (place - low) / (high - low)
+        };
+        let x = |place: f64| left + share(0, place) * (end - left);
+        let y = |place: f64| base - share(1, place) * (base - top);
+        for (place, name) in &scales[0].marks {
+            let (x, below) = (x(*place), base + 17.0);
+            writeln!(
+                out,
+                "<path d=\"M{x:.1} {top:.1}V{base:.1}\" stroke=\"#ddd\"/>"
+            )?;
+            writeln!(
+                out,
+                "<text x=\"{x:.1}\" y=\"{below:.1}\" text-anchor=\"middle\">{name}</text>"
+            )?;
+        }
+        for (place, name) in &scales[1].marks {
+            let (y, before) = (y(*place), left - 6.0);
+            writeln!(
+                out,
+                "<path d=\"M{left:.1} {y:.1}H{end:.1}\" stroke=\"#ddd\"/>"
+            )?;
+            let below = y + 4.0;
+            writeln!(
+                out,
+                "<text x=\"{before:.1}\" y=\"{below:.1}\" text-anchor=\"end\">{name}</text>"
+            )?;
+        }
+        writeln!(
+            out,
+            "<path d=\"M{left:.1} {top:.1}V{base:.1}H{end:.1}\" stroke=\"black\" fill=\"none\"/>"
+        )?;
+        let place = |at: [f64; 2]| {
+            let [across, up] = [self.axes[0].place(at[0]), self.axes[1].place(at[1])];
+            (across.is_finite() && up.is_finite()).then(|| [x(across), y(up)])
+        };
+        for Line {
+            through,
+            name,
+            color,
+        } in &self.lines
+        {
+            let places: Vec<_> = through.iter().filter_map(|&at| place(at)).collect();
+            let text: Vec<_> = places
+                .iter()
+                .map(|[x, y]| format!("{x:.1},{y:.1}"))
+                .collect();
+            writeln!(
+                out,
+                "<polyline points=\"{}\" stroke=\"{color}\" stroke-width=\"2\" fill=\"none\"/>",
+                text.join(" ")
+            )?;
+            if let Some([x, y]) = places.last() {
+                let (y, name) = (y - 6.0, escaped(name));
+                writeln!(
+                    out,
+                    "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"end\" fill=\"{color}\">{name}</text>"
+                )?;
+            }
+        }
+        for point in &self.points {
+            let Some([x, y]) = place(point.at) else {
+                continue;
+            };
+            let (color, name) = (point.color, escaped(&point.name));
+            writeln!(
+                out,
+                "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\" fill=\"{color}\"><title>{name}</title></circle>"
+            )?;
+            if point.labelled {
+                let (x, y) = (x + 6.0, y - 6.0);
+                writeln!(out, "<text x=\"{x:.1}\" y=\"{y:.1}\">{name}</text>")?;
+            }
+        }
+        let (middle, low) = ((left + end) / 2.0, height - 10.0);
+        let [across, up] = self.axes.each_ref().map(|axis| escaped(&axis.name));
+        writeln!(
+            out,
+            "<text x=\"{middle:.1}\" y=\"{low:.1}\" text-anchor=\"middle\">{across}</text>"
+        )?;
+        let middle = (top + base) / 2.0;
+        writeln!(
+            out,
+            "<text transform=\"translate(16,{middle:.1}) rotate(-90)\" text-anchor=\"middle\">{up}</text>\n</svg>"
+        )
+    }
+}
+
+/// Places of which no other is at most as far along both numbers and nearer along one, in order of the first number.
+pub fn pareto(places: &[[f64; 2]]) -> Vec<usize> {
+    let mut order: Vec<_> = (0..places.len()).collect();
+    order.sort_by(|&a, &b| {
+        let by = |axis: usize| places[a][axis].total_cmp(&places[b][axis]);
+        by(0).then(by(1))
+    });
+    let mut least = f64::INFINITY;
+    order.retain(|&index| {
+        let better = places[index][1] < least;
+        if better {
+            least = places[index][1];
+        }
+        better
+    });
+    order
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_front_has_what_nothing_beats() {
+        let places = [
+            [1.0, 5.0],
+            [2.0, 5.0],
+            [2.0, 3.0],
+            [3.0, 4.0],
+            [4.0, 1.0],
+            [1.0, 6.0],
+        ];
+        assert_eq!(pareto(&places), [0, 2, 4]);
+        assert!(pareto(&[]).is_empty());
+    }
+
+    #[test]
+    fn points_and_lines_are_where_the_axes_say() {
+        let axis = |name: &str, logarithmic| Axis {
+            name: name.to_owned(),
+            logarithmic,
+        };
+        let point = |at| Point {
+            at,
+            name: "a < b".to_owned(),
+            labelled: true,
+            color: "red",
+        };
+        let plot = Plot {
+            size: [400, 300],
+            axes: [axis("operations a byte", true), axis("time", false)],
+            points: vec![point([1.0, 0.0]), point([100.0, 2.0]), point([0.0, 1.0])],
+            lines: vec![Line {
+                through: vec![[1.0, 0.0], [1000.0, 1.0]],
+                name: "roof".to_owned(),
+                color: "blue",
+            }],
+        };
+        let svg = plot.svg();
+        // A point at zero has no place on a logarithmic axis.
+        assert_eq!(svg.matches("<circle").count(), 2);
+        assert!(svg.contains("<circle cx=\"68.0\"") && svg.contains(">a &lt; b</text>"));
+        for mark in ["1", "10", "100", "1000"] {
+            assert!(svg.contains(&format!(">{mark}</text>")), "{mark}");
+        }
+        assert!(!svg.contains("NaN") && !svg.contains("inf"));
+    }
+}

@@ -1,0 +1,339 @@
+//! The paper's baseline as a SIMT machine: stage 3 of the original 3DGS code on shader cores, a block of 256 threads for each
+//! tile, in warps of 32 that wait for their slowest lane. It is fixed by published microarchitecture and by the steps of the
+//! code's kernel, and no time of the paper's enters it; [`MACHINE`] says what each number's source is.
+
+use serde::Serialize;
+use timing::config::Config;
+use timing::work::{DrawWork, FrameWork, Mode, Run, TILE_SIDE, TileWork};
+
+/// A number of the machine, and who says it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Parameter {
+    /// Its name.
+    pub name: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// Where it comes from; "assumed" where nobody says it.
+    pub source: &'static str,
+}
+
+const fn parameter(name: &'static str, value: f64, source: &'static str) -> Parameter {
+    Parameter {
+        name,
+        value,
+        source,
+    }
+}
+
+const SCHEDULERS: Parameter = parameter(
+    "warp schedulers of an SM",
+    4.0,
+    "NVIDIA Ampere GA102 white paper: four partitions, each issues a warp's instruction in a cycle",
+);
+const WARP: Parameter = parameter("lanes of a warp", 32.0, "CUDA C++ Programming Guide");
+const BATCH: Parameter = parameter(
+    "Gaussians of a batch",
+    256.0,
+    "the original 3DGS code: a thread fetches one for its block",
+);
+const SPECIAL: Parameter = parameter(
+    "lanes of special functions of an SM",
+    16.0,
+    "CUDA C++ Programming Guide, arithmetic throughput, compute capability 8.7",
+);
+const LOAD_STORE: Parameter = parameter(
+    "lanes of loads and stores of an SM",
+    32.0,
+    "NVIDIA Ampere GA102 white paper has 16 in each of four partitions; that half of them reach shared memory is assumed",
+);
+const RESIDENT: Parameter = parameter(
+    "blocks of 256 threads in an SM",
+    6.0,
+    "CUDA C++ Programming Guide: 1536 threads, compute capability 8.7; that registers allow them is assumed",
+);
+const DEPENDENT: Parameter = parameter(
+    "cycles between dependent instructions of a warp",
+    4.0,
+    "Abdelkhalik et al., \"Demystifying the Nvidia Ampere Architecture through Microbenchmarking\", 2022",
+);
+const SKIPPED: Parameter = parameter(
+    "instructions of a warp in which no lane blends",
+    32.0,
+    "assumed: counted by hand from the steps of the kernel (loop 5, counter 1, two loads and their address 3, distance 2, \
+     power 7, its test 2, exponential 8, opacity and ceiling 2, floor 2)",
+);
+const BLENDED: Parameter = parameter(
+    "instructions more of a warp in which a lane blends",
+    18.0,
+    "assumed: counted by hand from the same (transmittance and its test 4, address 3, three loads 3, colour 6, two moves)",
+);
+const BATCH_INSTRUCTIONS: Parameter = parameter(
+    "instructions of a warp for a batch",
+    40.0,
+    "assumed: three loads, three stores, two barriers and a count of finished lanes",
+);
+const BATCH_LATENCY: Parameter = parameter(
+    "cycles until a batch's loads have come",
+    600.0,
+    "assumed: a miss of L2, twice one after the other would be an index and what it points at; other blocks hide it",
+);
+const CACHE: Parameter = parameter(
+    "bytes of L2",
+    4.0 * 1024.0 * 1024.0,
+    "NVIDIA Jetson AGX Orin technical brief: 4 MB; that Orin NX has as much is assumed",
+);
+const ENTRY_BYTES: Parameter = parameter(
+    "bytes of a list's entry",
+    4.0,
+    "the original 3DGS code: an index",
+);
+const GAUSSIAN_BYTES: Parameter = parameter(
+    "bytes of a Gaussian that a batch reads",
+    24.0,
+    "the original 3DGS code: centre, conic and opacity",
+);
+const COLOR_BYTES: Parameter = parameter(
+    "bytes of a colour, in a sector of L2",
+    32.0,
+    "the original 3DGS code reads 12 bytes where a warp blends; a sector has 32 (NVIDIA's profiler's documentation)",
+);
+
+/// The machine's numbers. SMs, clock and bandwidth are the preset's.
+pub const MACHINE: [Parameter; 16] = [
+    SCHEDULERS,
+    WARP,
+    BATCH,
+    SPECIAL,
+    LOAD_STORE,
+    RESIDENT,
+    DEPENDENT,
+    SKIPPED,
+    BLENDED,
+    BATCH_INSTRUCTIONS,
+    BATCH_LATENCY,
+    CACHE,
+    ENTRY_BYTES,
+    GAUSSIAN_BYTES,
+    COLOR_BYTES,
+    WARPS_OF_A_BLOCK,
+];
+const WARPS_OF_A_BLOCK: Parameter = parameter(
+    "warps of a block",
+    8.0,
+    "the original 3DGS code: 16x16 threads, so that a warp is two rows of a tile",
+);
+
+/// What stage 3 took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Simt {
+    /// Milliseconds of all blocks.
+    pub compute_ms: f64,
+    /// Of those, beyond what SMs that never ran out of blocks would have taken.
+    pub tail_ms: f64,
+    /// Milliseconds of main memory.
+    pub memory_ms: f64,
+    /// Warps and Gaussians evaluated together.
+    pub warps: f64,
+    /// The share of those in which a lane blends.
+    pub blended: f64,
+}
+
+impl Simt {
+    /// Milliseconds.
+    pub fn milliseconds(&self) -> f64 {
+        self.compute_ms.max(self.memory_ms)
+    }
+}
+
+/// A block's work.
+#[derive(Clone, Copy, Debug, Default)]
+struct Block {
+    /// Cycles of an SM that it has to itself as far as issue slots go.
+    cycles: f64,
+    /// Cycles that it takes at least, however few others there are.
+    least: f64,
+    warps: f64,
+    blended: f64,
+}
+
+/// Warps with an unfinished lane: neighbouring rows are taken to finish together, which is a lower bound.
+fn open_warps(run: &Run) -> f64 {
+    f64::from(run.rows.div_ceil(2))
+}
+
+/// The share of open warps in which a primitive reaches a pixel. Blocks of 4x4 pixels that it reaches are taken to be a
+/// square, of which each row is two warps. An estimate, for the trace tells of blocks and not of rows.
+fn blending(run: &Run) -> f64 {
+    let primitives = f64::from(run.primitives.max(1));
+    let blocks = f64::from(run.reached + run.hidden_blocks) / primitives;
+    let rows = blocks.sqrt().min(4.0);
+    (2.0 * rows / open_warps(run).max(1.0)).min(1.0)
+}
+
+impl Block {
+    fn of(tile: &TileWork) -> Self {
+        let mut block = Self::default();
+        for run in &tile.runs {
+            let warps = open_warps(run) * f64::from(run.primitives);
+            block.warps += warps;
+            block.blended += warps * blending(run);
+        }
+        // All threads take part in a batch, and a block ends with its batch.
+        let batches = (f64::from(tile.needed()) / BATCH.value).ceil();
+        let instructions = block.warps * SKIPPED.value
+            + block.blended * BLENDED.value
+            + batches * WARPS_OF_A_BLOCK.value * BATCH_INSTRUCTIONS.value;
+        let issue = instructions / SCHEDULERS.value;
+        let special = block.warps * WARP.value / SPECIAL.value;
+        // Two loads from shared memory, and where a lane blends three more and an index.
+        let loads = (2.0 * block.warps + 4.0 * block.blended) * WARP.value / LOAD_STORE.value;
+        block.cycles = issue.max(special).max(loads);
+        // Each warp alone issues once in so many cycles.
+        block.least =
+            instructions / WARPS_OF_A_BLOCK.value * DEPENDENT.value + batches * BATCH_LATENCY.value;
+        block
+    }
+}
+
+/// Stage 3 of a frame's Gaussians.
+pub fn simulate(frame: &FrameWork, config: &Config) -> Simt {
+    let draws = || {
+        frame
+            .draws
+            .iter()
+            .filter(|draw| draw.mode == Mode::Gaussian)
+    };
+    let blocks: Vec<_> = draws()
+        .flat_map(|draw| &draw.tiles)
+        .map(Block::of)
+        .collect();
+    let shader = &config.shader;
+    let sms = shader.sms as usize;
+    let cycles = schedule(&blocks, sms);
+    let even = blocks.iter().map(|block| block.cycles).sum::<f64>() / sms as f64;
+    let to_ms = 1e-6 / shader.clock_ghz;
+    let bytes: f64 = draws().map(bytes).sum();
+    let warps: f64 = blocks.iter().map(|block| block.warps).sum();
+    let blended: f64 = blocks.iter().map(|block| block.blended).sum();
+    Simt {
+        compute_ms: cycles * to_ms,
+        tail_ms: (cycles - even).max(0.0) * to_ms,
+        memory_ms: bytes / (config.memory.bandwidth_gb_s * config.memory.efficiency * 1e6),
+        warps,
+        blended: if warps > 0.0 { blended / warps } else { 0.0 },
+    }
+}
+
+/// Bytes of a draw that come from main memory or go there.
+fn bytes(draw: &DrawWork) -> f64 {
+    let needed = draw.needed_pairs() as f64;
+    // What is read again hits L2 as far as all that is drawn fits.
+    let set = draw.drawn as f64 * (GAUSSIAN_BYTES.value + COLOR_BYTES.value);
+    let again = (needed - draw.drawn as f64).max(0.0);
+    let misses = again * (1.0 - CACHE.value / set.max(CACHE.value));
+    let first = draw.drawn as f64;
+    let pixels = draw.tiles.len() as f64 * f64::from(TILE_SIDE * TILE_SIDE);
+    needed * ENTRY_BYTES.value
+        + (first + misses) * (GAUSSIAN_BYTES.value + COLOR_BYTES.value)
+        + pixels * 20.0
+}
+
+/// Cycles until all blocks have ended. A block goes to the first SM with room; those in an SM share its issue slots.
+fn schedule(blocks: &[Block], sms: usize) -> f64 {
+    let mut waiting = blocks.iter();
+    // Of each block in an SM: cycles left of its share and of its own pace.
+    let mut resident: Vec<Vec<[f64; 2]>> = vec![Vec::new(); sms];
+    let mut now = 0.0;
+    loop {
+        // The SM with the fewest blocks is first.
+        while let Some(place) = (0..sms)
+            .filter(|&sm| resident[sm].len() < RESIDENT.value as usize)
+            .min_by_key(|&sm| resident[sm].len())
+            && let Some(block) = waiting.next()
+        {
+            let pace = if block.cycles > 0.0 {
+                (block.least / block.cycles).max(1.0)
+            } else {
+                1.0
+            };
+            resident[place].push([block.cycles, pace]);
+        }
+        // A block's pace is its share of the SM, or its own if that is slower.
+        let slowness = |blocks: &[[f64; 2]], pace: f64| pace.max(blocks.len() as f64);
+        let ends = resident.iter().flat_map(|blocks| {
+            let until = |[left, pace]: &[f64; 2]| left * slowness(blocks, *pace);
+            blocks.iter().map(until)
+        });
+        let next = ends.fold(f64::INFINITY, f64::min);
+        if !next.is_finite() {
+            return now;
+        }
+        now += next;
+        for blocks in &mut resident {
+            let count = blocks.len() as f64;
+            for [left, pace] in blocks.iter_mut() {
+                *left -= next / pace.max(count);
+            }
+            blocks.retain(|[left, _]| *left > 1e-6);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use timing::simulate::even_frame;
+
+    fn config() -> Config {
+        Config::preset("orin-nx-10w", &[]).unwrap()
+    }
+
+    #[test]
+    fn warps_wait_for_their_slowest_lane() {
+        let mut frame = even_frame([320, 320], 400_000, 0.2);
+        let whole = simulate(&frame, &config());
+        assert!((whole.warps - 8.0 * 400_000.0).abs() < 1e-6);
+        // Half of the rows finish, one of each two: the warps go on.
+        let set = |frame: &mut FrameWork, rows| {
+            for tile in &mut frame.draws[0].tiles {
+                tile.runs[0].rows = rows;
+            }
+        };
+        set(&mut frame, 15);
+        assert_eq!(simulate(&frame, &config()).warps, whole.warps);
+        set(&mut frame, 8);
+        let half = simulate(&frame, &config());
+        assert!(half.warps == whole.warps / 2.0 && half.compute_ms < 0.6 * whole.compute_ms);
+    }
+
+    #[test]
+    fn skipped_pairs_cost_less_than_blended_ones() {
+        let mut frame = even_frame([320, 320], 400_000, 0.2);
+        let all = simulate(&frame, &config());
+        assert_eq!(all.blended, 1.0);
+        for tile in &mut frame.draws[0].tiles {
+            tile.runs[0].reached = tile.listed;
+        }
+        let few = simulate(&frame, &config());
+        assert!((few.blended - 0.25).abs() < 1e-9);
+        let ratio = (SKIPPED.value + BLENDED.value) / (SKIPPED.value + 0.25 * BLENDED.value);
+        assert!((all.compute_ms / few.compute_ms / ratio - 1.0).abs() < 0.02);
+    }
+
+    #[test]
+    fn a_long_block_is_a_tail() {
+        let even = even_frame([320, 320], 400_000, 0.2);
+        assert!(simulate(&even, &config()).tail_ms < 0.05 * simulate(&even, &config()).compute_ms);
+        let mut one = even.clone();
+        let last = one.draws[0].tiles.len() - 1;
+        let tile = &mut one.draws[0].tiles[last];
+        *tile = TileWork::open(tile.at, 60_000);
+        let result = simulate(&one, &config());
+        assert!(result.tail_ms > 0.2 * result.compute_ms, "{result:?}");
+    }
+
+    #[test]
+    fn every_number_has_a_source() {
+        assert!(MACHINE.iter().all(|parameter| parameter.source.len() > 10));
+    }
+}

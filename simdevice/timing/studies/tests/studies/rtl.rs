@@ -1,0 +1,195 @@
+//! The module in SystemVerilog, under Verilator, against the model bit by bit, and its cycles against the stepped model's.
+
+use crate::tiles::{self, View};
+use gaurast_runner::{Case, Need, Variant, data, is_long};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use timing::config::Config;
+use timing_studies::exponential::{Exponential, exp2};
+use timing_studies::module::{Drawn, Groups, List, Module};
+use timing_studies::number::Format;
+use timing_studies::rtl::{self, LATENCY, Latencies, ModuleBench, UnitBench};
+use timing_studies::rtl_cycles::{Cycles, Setting};
+
+const FORMATS: [(&str, Format); 2] = [("fp32", Format::SINGLE), ("fp16", Format::HALF)];
+
+fn formats() -> Vec<Variant> {
+    FORMATS.map(|(name, _)| Variant::new(name)).into()
+}
+
+fn format(case: &Case) -> Format {
+    let found = FORMATS.iter().find(|(name, _)| *name == case.variant());
+    found.expect("a format").1
+}
+
+/// A folder that keeps what Verilator builds from one run of the tests to the next.
+fn folder() -> PathBuf {
+    Path::new(env!("CARGO_TARGET_TMPDIR")).join("rtl")
+}
+
+/// One build at a time: tests of a process share what is built.
+static BUILDING: Mutex<()> = Mutex::new(());
+
+fn module_bench(format: Format) -> ModuleBench {
+    let _guard = BUILDING.lock();
+    ModuleBench::build(&folder(), format, &[]).expect("a bench")
+}
+
+#[gaurast_runner::test(each = formats(), needs = [Need::Program("verilator"), Need::Program("make"), Need::Program("c++")])]
+fn units_compute_the_models_bits(case: &Case) {
+    let format = format(case);
+    let bench = {
+        let _guard = BUILDING.lock();
+        UnitBench::build(&folder(), format).expect("a bench")
+    };
+    let mut random = ChaCha8Rng::seed_from_u64(3);
+    let mask = u32::MAX >> (32 - format.bits());
+    let count = if is_long() { 1_000_000 } else { 40_000 };
+    let pairs: Vec<[u32; 2]> = (0..count)
+        .map(|index| {
+            let mut number = || match index % 3 {
+                0 => random.random::<u32>() & mask,
+                // Of magnitudes near 1.
+                _ => {
+                    let exponent = (format.bias() + random.random_range(-8..8)) as u32;
+                    let rest = random.random::<u32>()
+                        & mask
+                        & !(((1 << format.exponent) - 1) << format.mantissa);
+                    rest | exponent << format.mantissa
+                }
+            };
+            let a = number();
+            let near = a ^ 1 << (format.bits() - 1) ^ index as u32 % 7;
+            [a, if index % 6 == 2 { near } else { number() }]
+        })
+        .collect();
+    for ([a, b], results) in pairs.iter().zip(bench.run(&pairs).expect("results")) {
+        let (sum, product) = (format.add(*a, *b), format.mul(*a, *b));
+        let expected = [
+            sum,
+            sum,
+            product,
+            product,
+            format.div(*a, *b),
+            exp2(format, Exponential::Table, *a),
+            exp2(format, Exponential::Polynomial, *a),
+        ];
+        assert_eq!(results, expected, "{a:x} {b:x}");
+    }
+}
+
+/// Draws lists on both, and holds every pixel against its twin.
+fn compare(bench: &ModuleBench, module: &Module, lists: &[List]) -> Vec<Drawn> {
+    let rasterized = bench.run(lists, module, LATENCY).expect("a run");
+    assert_eq!(rasterized.pixels.len(), lists.len());
+    let drawn: Vec<_> = lists.iter().map(|list| module.draw(list)).collect();
+    for (index, (ours, theirs)) in rasterized.pixels.iter().zip(&drawn).enumerate() {
+        for (pixel, (ours, theirs)) in ours.iter().zip(&theirs.pixels).enumerate() {
+            assert_eq!(
+                ours, theirs,
+                "list {index}, pixel {pixel}: {ours:x?} {theirs:x?}"
+            );
+        }
+    }
+    drawn
+}
+
+#[gaurast_runner::test(each = formats(), needs = [Need::Program("verilator"), Need::Program("make"), Need::Program("c++")])]
+fn the_module_draws_generated_tiles_as_the_model_does(case: &Case) {
+    let format = format(case);
+    let bench = module_bench(format);
+    let count = if is_long() { 300 } else { 10 };
+    let mut contributions = 0;
+    for setting in Setting::ALL {
+        let module = setting.module(format);
+        let lists = tiles::generated(format, setting.groups, setting.masked, count, setting.seed);
+        let drawn = compare(&bench, &module, &lists);
+        contributions += drawn
+            .iter()
+            .map(|drawn| drawn.work.contributions)
+            .sum::<u64>();
+    }
+    assert!(contributions > 1000 * count as u64, "{contributions}");
+}
+
+#[gaurast_runner::test(each = formats(), needs = [Need::Program("verilator"), Need::Program("make"), Need::Program("c++"), Need::Data("splats/playbot-125k.ply"), Need::Data("splats/skull.ply")])]
+fn the_module_draws_real_tiles_as_the_model_does(case: &Case) {
+    let format = format(case);
+    let bench = module_bench(format);
+    let count = if is_long() { 350 } else { 4 };
+    let mut contributions = 0;
+    for path in ["splats/playbot-125k.ply", "splats/skull.ply"] {
+        let view = View::open(&data(path), [640, 360]);
+        let module = Module::new(format, Exponential::Table, Groups::Rows);
+        let lists = view.lists(format, None, count, 5);
+        assert_eq!(lists.len(), count);
+        let drawn = compare(&bench, &module, &lists);
+        contributions += drawn
+            .iter()
+            .map(|drawn| drawn.work.contributions)
+            .sum::<u64>();
+    }
+    assert!(contributions > 1000 * count as u64, "{contributions}");
+}
+
+#[gaurast_runner::test(each = formats(), needs = [Need::Program("verilator"), Need::Program("make"), Need::Program("c++")])]
+fn the_modules_cycles_are_the_stepped_models(case: &Case) {
+    let format = format(case);
+    let bench = module_bench(format);
+    for setting in Setting::ALL {
+        let lists = tiles::generated(format, setting.groups, setting.masked, 24, setting.seed);
+        let cycles = Cycles::of(&bench, setting, format, &lists).expect("cycles");
+        let [all, busy, dependency, memory, controller, modes] = cycles.by_cause();
+        let near = |[ours, model]: [f64; 2], share: f64| {
+            assert!(
+                (ours - model).abs() <= share * all[1],
+                "{setting:?}: {:?}",
+                cycles.by_cause()
+            );
+        };
+        near(all, if setting.masked { 0.12 } else { 0.08 });
+        // Pixels that are on their way finish later than the model has it.
+        assert!(busy[0] >= busy[1]);
+        near(busy, 0.04);
+        // The model doesn't know who shares what.
+        near(dependency, if setting.masked { 0.12 } else { 0.0 });
+        near(memory, 0.12);
+        near(controller, 0.01);
+        near(modes, 0.04);
+        assert_eq!(
+            cycles.latency,
+            Latencies::of(format, Exponential::Table).longest() + 1
+        );
+    }
+}
+
+#[gaurast_runner::test]
+fn the_presets_have_the_latencies_of_the_module() {
+    for (name, format) in [("paper-15x16", Format::SINGLE), ("fp16", Format::HALF)] {
+        let raster = Config::preset(name, &[]).expect("a preset").rasterizer;
+        let latencies = Latencies::of(format, Exponential::Table);
+        assert_eq!(raster.gaussian_latency, latencies.gaussian);
+        assert_eq!(raster.triangle_latency, latencies.triangle);
+        assert_eq!(raster.carried_latency, latencies.carried);
+        assert_eq!([raster.gaussian_interval, raster.triangle_interval], [1, 1]);
+    }
+}
+
+#[gaurast_runner::test(needs = [Need::Program("yosys")])]
+fn yosys_reads_the_module() {
+    let folder = folder().join("yosys");
+    rtl::write(&folder).expect("files");
+    let script = format!(
+        "read_verilog -sv -I. {}; hierarchy -check -top raster_module",
+        rtl::sources().join(" ")
+    );
+    let output = std::process::Command::new("yosys")
+        .current_dir(&folder)
+        .args(["-q", "-p", &script])
+        .output()
+        .expect("yosys");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+}

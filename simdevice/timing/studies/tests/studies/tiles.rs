@@ -1,0 +1,258 @@
+//! Lists of tiles for the rasterizer module: those of scenes, and generated ones that press it.
+
+use gaurast_oracle::oracle::project::{Splat, project};
+use gaurast_oracle::oracle::{OracleCamera, OracleState};
+use gaurast_oracle::scenes::SceneBuffers;
+use rand::seq::IndexedRandom;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::path::Path;
+use timing::work::Mode;
+use timing_studies::module::{Groups, List, Primitive};
+use timing_studies::number::Format;
+use timing_studies::pe::{Gaussian, Triangle};
+
+const SIDE: f64 = 16.0;
+
+/// Gaussians of a scene as its pixels see them, in depth order.
+pub struct View {
+    splats: Vec<Splat>,
+    size: [u32; 2],
+}
+
+impl View {
+    /// The scene of a file, framed as `gaurast render` frames it.
+    pub fn open(path: &Path, size: [u32; 2]) -> Self {
+        let scene = gaurast_scene::open(path).expect("a scene");
+        let camera = gaurast_scene::frame(&scene, 60f64.to_radians(), size);
+        let camera = OracleCamera::new(&camera.to_vulkan(), size).expect("a camera");
+        let (buffers, state) = (SceneBuffers::from(&scene), OracleState::default());
+        let oracle = buffers.as_oracle();
+        let drawn = |index| project(&oracle, &camera, &state, index).ok();
+        let mut splats: Vec<_> = (0..oracle.len()).filter_map(drawn).collect();
+        splats.sort_by(|a, b| a.key.total_cmp(&b.key));
+        Self { splats, size }
+    }
+
+    /// The lists of `count` tiles with something in them, drawn by a seed.
+    pub fn lists(
+        &self,
+        format: Format,
+        groups: Option<Groups>,
+        count: usize,
+        seed: u64,
+    ) -> Vec<List> {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let [columns, rows] = self.size.map(|side| side.div_ceil(SIDE as u32));
+        let mut tiles: Vec<_> = (0..columns * rows)
+            .map(|index| [index % columns, index / columns])
+            .collect();
+        let mut lists = Vec::new();
+        while lists.len() < count && !tiles.is_empty() {
+            let at = tiles.swap_remove(random.random_range(0..tiles.len()));
+            lists.extend(self.list(format, groups, at));
+        }
+        lists
+    }
+
+    fn list(&self, format: Format, groups: Option<Groups>, at: [u32; 2]) -> Option<List> {
+        let corner = at.map(|at| f64::from(at) * SIDE);
+        let primitives: Vec<_> = self
+            .splats
+            .iter()
+            .filter(|splat| boxes_touch(splat, corner))
+            .filter_map(|splat| primitive(splat, format, groups, corner))
+            .collect();
+        (!primitives.is_empty()).then_some(List {
+            mode: Mode::Gaussian,
+            primitives,
+        })
+    }
+}
+
+/// Distance along an axis within which alpha reaches its floor.
+fn reach(splat: &Splat, axis: usize) -> f64 {
+    let variance = [splat.covariance[0], splat.covariance[2]][axis];
+    let square: f64 = 2.0 * (splat.opacity * 255.0).ln().max(0.0) * variance;
+    square.sqrt()
+}
+
+fn boxes_touch(splat: &Splat, corner: [f64; 2]) -> bool {
+    (0..2).all(|axis| {
+        let (mean, reach) = (splat.mean[axis], reach(splat, axis));
+        mean + reach > corner[axis] && mean - reach < corner[axis] + SIDE
+    })
+}
+
+/// A Gaussian of a tile's list, evaluated everywhere or in the groups in which it reaches a pixel's centre.
+fn primitive(
+    splat: &Splat,
+    format: Format,
+    groups: Option<Groups>,
+    corner: [f64; 2],
+) -> Option<Primitive> {
+    let [xx, xy, yy] = splat.covariance;
+    let exponent = [-0.5 * yy, xy, -0.5 * xx].map(|value| value / splat.determinant);
+    let mean = [0, 1].map(|axis| splat.mean[axis] - corner[axis]);
+    let mask = match groups {
+        None => u16::MAX,
+        Some(groups) => reached(groups, mean, exponent, splat.opacity),
+    };
+    let gaussian = Gaussian::new(
+        format,
+        mean.map(|value| value as f32),
+        exponent.map(|value| value as f32),
+        splat.opacity as f32,
+        splat.color.map(|value| value as f32),
+    );
+    (mask != 0).then_some(Primitive::Gaussian(mask, gaussian))
+}
+
+fn reached(groups: Groups, mean: [f64; 2], [a, b, c]: [f64; 3], opacity: f64) -> u16 {
+    let is_reached = |group: usize| {
+        (0..16).any(|lane| {
+            let [x, y] = groups.centre(group, lane).map(f64::from);
+            let (dx, dy) = (x - mean[0], y - mean[1]);
+            opacity * (a * dx * dx + b * dx * dy + c * dy * dy).exp() >= 1.0 / 255.0
+        })
+    };
+    (0..16).fold(0, |mask, group| {
+        mask | u16::from(is_reached(group)) << group
+    })
+}
+
+/// Gaussians that a tile may be pressed with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// A hundred times as long as wide.
+    Needles,
+    /// Nearly opaque, and as large as the tile: lists end.
+    Saturated,
+    /// Of all sizes and opacities.
+    Mixed,
+    /// Small ones in single groups.
+    Sparse,
+}
+
+pub const KINDS: [Kind; 4] = [Kind::Needles, Kind::Saturated, Kind::Mixed, Kind::Sparse];
+
+/// A generated list of Gaussians.
+pub fn gaussians(
+    format: Format,
+    groups: Option<Groups>,
+    kind: Kind,
+    random: &mut ChaCha8Rng,
+) -> List {
+    let count = match kind {
+        Kind::Saturated => random.random_range(60..300),
+        _ => random.random_range(1..200),
+    };
+    let mut primitives = Vec::new();
+    while primitives.len() < count {
+        let scale =
+            |random: &mut ChaCha8Rng, low: f64, high: f64| random.random_range(low..high).exp();
+        let sigmas = match kind {
+            Kind::Needles => {
+                let short = scale(random, -0.7, 0.7);
+                [100.0 * short, short]
+            }
+            Kind::Saturated => [scale(random, 2.5, 4.0), scale(random, 2.5, 4.0)],
+            Kind::Mixed => [scale(random, -0.6, 4.0), scale(random, -0.6, 4.0)],
+            Kind::Sparse => [scale(random, -0.6, 0.2), scale(random, -0.6, 0.2)],
+        };
+        let opacity = match kind {
+            Kind::Saturated => random.random_range(0.6..1.0),
+            _ => random.random_range(0.01..1.0),
+        };
+        let (sin, cos) = random.random_range(0.0..std::f64::consts::PI).sin_cos();
+        let [u, v] = sigmas.map(|sigma| sigma.powi(-2));
+        let [a, b, c] = [
+            u * cos * cos + v * sin * sin,
+            2.0 * (u - v) * sin * cos,
+            u * sin * sin + v * cos * cos,
+        ];
+        let exponent = [a, b, c].map(|value| -0.5 * value);
+        let mean = [0; 2].map(|_| random.random_range(-4.0..20.0));
+        let mask = groups.map_or(u16::MAX, |groups| reached(groups, mean, exponent, opacity));
+        if mask == 0 && random.random_bool(0.9) {
+            continue;
+        }
+        let gaussian = Gaussian::new(
+            format,
+            mean.map(|value| value as f32),
+            exponent.map(|value| value as f32),
+            opacity as f32,
+            [0; 3].map(|_| random.random_range(0.0..1.5)),
+        );
+        primitives.push(Primitive::Gaussian(mask, gaussian));
+    }
+    List {
+        mode: Mode::Gaussian,
+        primitives,
+    }
+}
+
+/// A generated list of triangles, some of them needles, that cover some of the tile.
+pub fn triangles(format: Format, groups: Groups, random: &mut ChaCha8Rng) -> List {
+    let count = random.random_range(1..80);
+    let mut primitives = Vec::new();
+    while primitives.len() < count {
+        let thin = random.random_bool(0.3);
+        let mut vertex = || [0, 1].map(|_| random.random_range(-10.0..26.0f64));
+        let (p, q, mut r) = (vertex(), vertex(), vertex());
+        if thin {
+            r = [q[0] + 0.3, q[1] - 0.4];
+        }
+        let inverse = [0; 3].map(|_| random.random_range(0.05..1.0f64));
+        let area = (q[0] - p[0]) * (r[1] - p[1]) - (r[0] - p[0]) * (q[1] - p[1]);
+        if area.abs() < 0.5 {
+            continue;
+        }
+        let plane = |values: [f64; 3]| {
+            let [d1, d2] = [values[1] - values[0], values[2] - values[0]];
+            let a = (d1 * (r[1] - p[1]) - d2 * (q[1] - p[1])) / area;
+            let b = (d2 * (q[0] - p[0]) - d1 * (r[0] - p[0])) / area;
+            [a, b, values[0] - a * p[0] - b * p[1]].map(|value| value as f32)
+        };
+        let planes = [
+            plane([0.0, inverse[1], 0.0]),
+            plane([0.0, 0.0, inverse[2]]),
+            plane(inverse),
+        ];
+        let weight = |[a, b, c]: [f32; 3], x: f32, y: f32| a * x + b * y + c;
+        let covers = |group: usize| {
+            (0..16).any(|lane| {
+                let [x, y] = groups.centre(group, lane);
+                let [u, v, w] = planes.map(|plane| weight(plane, x, y));
+                u > -0.01 && v > -0.01 && w - u - v > -0.01
+            })
+        };
+        let mask = (0..16).fold(0, |mask, group| mask | u16::from(covers(group)) << group);
+        if mask != 0 {
+            primitives.push(Primitive::Triangle(mask, Triangle::new(format, planes)));
+        }
+    }
+    List {
+        mode: Mode::Triangle,
+        primitives,
+    }
+}
+
+/// Generated lists of every kind, of triangles one in four.
+pub fn generated(
+    format: Format,
+    groups: Groups,
+    masked: bool,
+    count: usize,
+    seed: u64,
+) -> Vec<List> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let list = |index: usize| {
+        if index % 4 == 3 {
+            return triangles(format, groups, &mut random);
+        }
+        let kind = *KINDS.choose(&mut random).expect("a kind");
+        gaussians(format, masked.then_some(groups), kind, &mut random)
+    };
+    (0..count).map(list).collect()
+}
