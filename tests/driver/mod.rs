@@ -1,3 +1,5 @@
-//! The driver as the Vulkan loader and its layers find it.
+//! The driver as the Vulkan loader and its layers find it; and the limits, features and extensions that strangers' programs ask
+//! for, each held against what a program gets of it.
 
+mod limits;
 mod loader_door;

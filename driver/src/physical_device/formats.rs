@@ -207,7 +207,16 @@ const USAGES: &[(vk::ImageUsageFlags, vk::FormatFeatureFlags)] = &[
     ),
 ];
 
+/// The features of which an input attachment's format must have one: shaders read nothing that is not rendered to.
+const ATTACHMENT: vk::FormatFeatureFlags = vk::FormatFeatureFlags::from_raw(
+    vk::FormatFeatureFlags::COLOR_ATTACHMENT.as_raw()
+        | vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT.as_raw(),
+);
+
 fn supports_usage(features: vk::FormatFeatureFlags, usage: vk::ImageUsageFlags) -> bool {
+    if usage.contains(vk::ImageUsageFlags::INPUT_ATTACHMENT) && !features.intersects(ATTACHMENT) {
+        return false;
+    }
     let supported = USAGES
         .iter()
         .filter(|(_, needed)| features.contains(*needed))
@@ -284,9 +293,7 @@ pub(crate) fn image_properties(query: ImageQuery) -> Result<vk::ImageFormatPrope
         }
     };
     let is_linear = tiling == vk::ImageTiling::LINEAR;
-    let is_attachment = features.intersects(
-        vk::FormatFeatureFlags::COLOR_ATTACHMENT | vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT,
-    );
+    let is_attachment = features.intersects(ATTACHMENT);
     let has_samples = is_attachment
         && !is_linear
         && ty == vk::ImageType::TYPE_2D

@@ -42,7 +42,7 @@ const PROCESSING_ELEMENTS: u32 = 16;
 pub(crate) const MAX_IMAGE_DIMENSION: u32 = 16384;
 
 /// The greatest extent of an image in three dimensions.
-pub(crate) const MAX_IMAGE_DIMENSION_3D: u32 = 2048;
+pub(crate) const MAX_IMAGE_DIMENSION_3D: u32 = 4096;
 
 /// The most array layers of an image or framebuffer.
 pub(crate) const MAX_LAYERS: u32 = 2048;
@@ -81,6 +81,19 @@ const DYNAMIC_DESCRIPTORS: u32 = 64;
 
 /// Offsets of uniform, storage and texel buffers must be multiples of this.
 pub(crate) const MIN_BUFFER_OFFSET_ALIGNMENT: u64 = 16;
+
+/// The most texels of a texel buffer.
+pub(crate) const MAX_TEXEL_BUFFER_ELEMENTS: u32 = 1 << 27;
+
+/// The most scalars that a vertex shader hands to a fragment shader: 32 vectors of four.
+const MAX_VARYING_COMPONENTS: u32 = 128;
+
+/// The offsets in texels that an instruction may give.
+const TEXEL_OFFSETS: std::ops::RangeInclusive<i32> = -32..=31;
+
+/// The most workgroups of a dispatch in x, y and z. The device takes any number; programs that read the limit as signed take
+/// a greater one for -1.
+const MAX_WORKGROUP_COUNT: u32 = 65535;
 
 /// The most invocations of a workgroup in x, y and z.
 pub(crate) const MAX_WORKGROUP_SIZE: [u32; 3] = [MAX_WORKGROUP_INVOCATIONS; 3];
@@ -138,7 +151,7 @@ fn find_properties() -> Properties {
         max_image_dimension3_d: MAX_IMAGE_DIMENSION_3D,
         max_image_dimension_cube: MAX_IMAGE_DIMENSION,
         max_image_array_layers: MAX_LAYERS,
-        max_texel_buffer_elements: 1 << 16,
+        max_texel_buffer_elements: MAX_TEXEL_BUFFER_ELEMENTS,
         max_uniform_buffer_range: 1 << 16,
         max_storage_buffer_range: u32::MAX,
         max_push_constants_size: MAX_PUSH_CONSTANTS_SIZE,
@@ -166,7 +179,7 @@ fn find_properties() -> Properties {
         max_vertex_input_bindings: MAX_VERTEX_INPUTS,
         max_vertex_input_attribute_offset: 65535,
         max_vertex_input_binding_stride: 65536,
-        max_vertex_output_components: 64,
+        max_vertex_output_components: MAX_VARYING_COMPONENTS,
         max_tessellation_generation_level: 0,
         max_tessellation_patch_size: 0,
         max_tessellation_control_per_vertex_input_components: 0,
@@ -180,12 +193,12 @@ fn find_properties() -> Properties {
         max_geometry_output_components: 0,
         max_geometry_output_vertices: 0,
         max_geometry_total_output_components: 0,
-        max_fragment_input_components: 64,
+        max_fragment_input_components: MAX_VARYING_COMPONENTS,
         max_fragment_output_attachments: MAX_COLOR_ATTACHMENTS,
         max_fragment_dual_src_attachments: 1,
         max_fragment_combined_output_resources: DESCRIPTORS,
         max_compute_shared_memory_size: MAX_SHARED_BYTES,
-        max_compute_work_group_count: [u32::MAX; 3],
+        max_compute_work_group_count: [MAX_WORKGROUP_COUNT; 3],
         max_compute_work_group_invocations: MAX_WORKGROUP_INVOCATIONS,
         max_compute_work_group_size: MAX_WORKGROUP_SIZE,
         sub_pixel_precision_bits: 8,
@@ -206,10 +219,10 @@ fn find_properties() -> Properties {
         min_texel_buffer_offset_alignment: MIN_BUFFER_OFFSET_ALIGNMENT,
         min_uniform_buffer_offset_alignment: MIN_BUFFER_OFFSET_ALIGNMENT,
         min_storage_buffer_offset_alignment: MIN_BUFFER_OFFSET_ALIGNMENT,
-        min_texel_offset: -8,
-        max_texel_offset: 7,
-        min_texel_gather_offset: -8,
-        max_texel_gather_offset: 7,
+        min_texel_offset: *TEXEL_OFFSETS.start(),
+        max_texel_offset: *TEXEL_OFFSETS.end() as u32,
+        min_texel_gather_offset: *TEXEL_OFFSETS.start(),
+        max_texel_gather_offset: *TEXEL_OFFSETS.end() as u32,
         min_interpolation_offset: -0.5,
         // The greatest offset is less than half a pixel by one step of its precision.
         max_interpolation_offset: 0.5 - 1.0 / 16.0,

@@ -5,7 +5,7 @@ use crate::abi::error::Error;
 use crate::abi::handle::{self, objects};
 use crate::abi::valid::{self, OutputChain};
 use crate::physical_device::formats;
-use crate::physical_device::limits::MIN_BUFFER_OFFSET_ALIGNMENT;
+use crate::physical_device::limits::{MAX_TEXEL_BUFFER_ELEMENTS, MIN_BUFFER_OFFSET_ALIGNMENT};
 use crate::physical_device::memory::ALL_TYPE_BITS;
 use ash::vk;
 use simdevice::packet::BufferRange;
@@ -291,10 +291,17 @@ pub(crate) unsafe fn create_buffer_view(
     }
     // SAFETY: the caller's promise.
     let buffer = unsafe { handle::get(info.buffer)? };
-    Ok(Arc::new(BufferView {
-        range: buffer.range(info.offset, size, &VIEWED)?,
-        format,
-    }))
+    let range = buffer.range(info.offset, size, &VIEWED)?;
+    let texels = range.size / format.texel_size().max(1) as u64;
+    if texels > u64::from(MAX_TEXEL_BUFFER_ELEMENTS) {
+        return Err(Error::usage(
+            "VUID-VkBufferViewCreateInfo-range-00930",
+            format!(
+                "a texel buffer of {texels} texels; there may be {MAX_TEXEL_BUFFER_ELEMENTS}"
+            ),
+        ));
+    }
+    Ok(Arc::new(BufferView { range, format }))
 }
 
 #[cfg(test)]
