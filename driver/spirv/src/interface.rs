@@ -253,6 +253,8 @@ pub struct Interface {
     pub has_side_effects: bool,
     /// It uses operations of a subgroup.
     pub uses_subgroups: bool,
+    /// It reaches memory by device addresses.
+    pub uses_addresses: bool,
 }
 
 impl Interface {

@@ -15,7 +15,7 @@ use super::filter::{border_texel, reference_value};
 use super::lod;
 use super::lod::Selection;
 use super::packing::{PackedLevel, Packing, Rows};
-use super::sampler::{AddressMode, CompareOp, Filter, Sampler};
+use super::sampler::{AddressMode, CompareOp, Filter, Reduction, Sampler};
 use super::surface::Surface;
 use crate::format::Numeric;
 use crate::texture::packing::Floats;
@@ -46,7 +46,12 @@ pub(super) fn sample<S: Simd>(
 ) -> Option<[Lanes; 4]> {
     let packing = surface.packing.as_ref()?;
     let shape = request.shape;
-    if shape.multisampled || shape.dimension == Dimension::Buffer || request.gather.is_some() {
+    let is_mean = sampler.reduction == Reduction::WeightedAverage;
+    if shape.multisampled
+        || shape.dimension == Dimension::Buffer
+        || request.gather.is_some()
+        || !is_mean
+    {
         return None;
     }
     let reference = sampler.compare_op.zip(request.compare).map(|(op, bits)| {

@@ -36,10 +36,10 @@ pub(super) fn read(surface: &Surface, request: &TexelRequest) -> [Lanes; 4] {
     let mut out = [[0; CHUNK_LANES]; 4];
     for lane in lanes(request) {
         let texel = place(request.shape, request, lane);
-        if let Some(texel) = surface.texel(request.level[lane] as usize, texel) {
-            for (out, component) in out.iter_mut().zip(surface.swizzled(texel)) {
-                out[lane] = component;
-            }
+        let texel = surface.texel(request.level[lane] as usize, texel);
+        let texel = texel.unwrap_or_else(|| surface.outside());
+        for (out, component) in out.iter_mut().zip(surface.swizzled(texel)) {
+            out[lane] = component;
         }
     }
     out

@@ -5,10 +5,11 @@
 //! specification says. Weights are binary32 throughout, sRGB is decoded before it is filtered, cubes are seamless.
 //! Hostile coordinates are safe: NaN counts as 0, and everything is bounds-checked.
 //!
-//! There are two ways to filter: lane by lane (`filter`), which does everything, and 16 lanes at once (`batch`), which
+//! An anisotropic sample (`anisotropy`) is several isotropic ones. There are two ways to take those: lane by lane (`filter`), which does everything, and 16 lanes at once (`batch`), which
 //! does the common formats. They agree bit for bit, at every SIMD level.
 
 mod address;
+mod anisotropy;
 mod axis;
 mod batch;
 mod cube;
@@ -24,7 +25,7 @@ mod table;
 mod tests;
 mod view;
 
-pub use sampler::{AddressMode, BorderColor, CompareOp, Filter, MipmapMode, Sampler};
+pub use sampler::{AddressMode, BorderColor, CompareOp, Filter, MipmapMode, Reduction, Sampler};
 pub use table::ImageTable;
 pub use view::{
     ComponentSwizzle, IDENTITY, ImageBinding, SampledImage, StorageImage, Swizzle, TexelBuffer,

@@ -8,7 +8,7 @@ use fearless_simd::{Simd, f32x4, f32x16, prelude::*, u32x4, u32x16};
 use super::axis::taps;
 use super::lod::{self, QUADS};
 use super::packing::{Around, Kind, PackedLevel, Packing, Srgb8x4, Texels, Unorm8x4};
-use super::sampler::{AddressMode, Filter, Sampler};
+use super::sampler::{AddressMode, Filter, Reduction, Sampler};
 use super::surface::Surface;
 use isa::ir::{CHUNK_LANES, Dimension};
 use isa::resources::{Lanes, LodRequest, SampleRequest};
@@ -55,6 +55,7 @@ fn is_plain(sampler: &Sampler, request: &SampleRequest) -> bool {
         && (request.compare.is_none() || sampler.compare_op.is_none())
         && (sampler.mag_filter, sampler.min_filter) == (Filter::Linear, Filter::Linear)
         && !sampler.unnormalized_coordinates
+        && sampler.reduction == Reduction::WeightedAverage
         && x != AddressMode::ClampToBorder
         && y != AddressMode::ClampToBorder
         && moved == 0

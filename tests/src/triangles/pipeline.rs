@@ -70,6 +70,8 @@ pub struct PipelineOptions<'a> {
     pub bindings: Option<&'a Bindings>,
     /// A render pass object and subpass instead of dynamic rendering.
     pub subpass: Option<(vk::RenderPass, u32)>,
+    /// The views of a dynamic render, a bit each.
+    pub view_mask: u32,
 }
 
 impl Default for PipelineOptions<'_> {
@@ -97,6 +99,7 @@ impl Default for PipelineOptions<'_> {
             dynamic: Vec::new(),
             bindings: None,
             subpass: None,
+            view_mask: 0,
         }
     }
 }
@@ -239,6 +242,7 @@ impl Pipeline {
         let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic);
         let (colors, depth, stencil) = target.formats();
         let mut rendering = vk::PipelineRenderingCreateInfo::default()
+            .view_mask(options.view_mask)
             .color_attachment_formats(colors)
             .depth_attachment_format(depth)
             .stencil_attachment_format(stencil);
@@ -332,7 +336,9 @@ impl Kernel {
             // SAFETY: see `triangles`.
             unsafe {
                 device.cmd_bind_pipeline(commands.raw, point, self.raw);
-                device.cmd_bind_descriptor_sets(commands.raw, point, self.layout, 0, sets, &[]);
+                if !sets.is_empty() {
+                    device.cmd_bind_descriptor_sets(commands.raw, point, self.layout, 0, sets, &[]);
+                }
                 if !push.is_empty() {
                     let (stage, bytes) = (
                         vk::ShaderStageFlags::COMPUTE,

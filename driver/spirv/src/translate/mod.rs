@@ -223,6 +223,7 @@ fn empty_interface(stage: Stage) -> Interface {
         per_sample: false,
         has_side_effects: false,
         uses_subgroups: false,
+        uses_addresses: false,
     }
 }
 
@@ -313,6 +314,7 @@ pub fn is_supported(capability: Capability) -> bool {
             | C::InterpolationFunction
             | C::StorageImageReadWithoutFormat
             | C::StorageImageWriteWithoutFormat
+            | C::MultiView
             | C::MultiViewport
             | C::GroupNonUniform
             | C::GroupNonUniformVote

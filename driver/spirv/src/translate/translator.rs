@@ -138,6 +138,7 @@ impl Translator<'_> {
                 let (class, pointee) = self.globals.types.pointer(self.type_of(id)?)?;
                 match (class, &*regs) {
                     (StorageClass::PhysicalStorageBuffer, [address]) => {
+                        self.interface.uses_addresses = true;
                         Ok(Pointer::Memory(MemoryRef {
                             space: Space::Global,
                             base: Some(*address),
