@@ -327,6 +327,27 @@ pub(crate) fn border_color(color: vk::BorderColor) -> Result<BorderColor, Error>
     }
 }
 
+/// A border colour of the application's own: the bits of its components.
+pub(crate) fn custom_border_color(color: vk::ClearColorValue) -> BorderColor {
+    // SAFETY: every member of the union is sixteen bytes of plain data.
+    BorderColor(unsafe { color.uint32 })
+}
+
+/// What becomes of the texels that are filtered together.
+///
+/// # Errors
+/// [`Error::FeatureNotPresent`] for modes of extensions.
+pub(crate) fn reduction(mode: vk::SamplerReductionMode) -> Result<texture::Reduction, Error> {
+    match mode {
+        vk::SamplerReductionMode::WEIGHTED_AVERAGE => Ok(texture::Reduction::WeightedAverage),
+        vk::SamplerReductionMode::MIN => Ok(texture::Reduction::Min),
+        vk::SamplerReductionMode::MAX => Ok(texture::Reduction::Max),
+        other => Err(Error::FeatureNotPresent(format!(
+            "reduction mode {other:?}"
+        ))),
+    }
+}
+
 /// The aspect that shaders read of a view.
 pub(crate) fn view_aspect(mask: vk::ImageAspectFlags) -> Aspect {
     if mask.contains(vk::ImageAspectFlags::DEPTH) {

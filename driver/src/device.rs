@@ -3,11 +3,12 @@
 use crate::abi::error::Error;
 use crate::abi::handle::{self, Reporter, objects};
 use crate::abi::valid;
+use crate::device_addresses::Addresses;
 use crate::device_sync::DeviceSync;
 use crate::instance::{EnabledExtensions, Instance, PhysicalDevice, resolve_extensions};
 use crate::physical_device::environment::{self, Dump};
 use crate::physical_device::memory::{self, Heap};
-use crate::physical_device::{QUEUE_COUNT, QUEUE_FAMILY};
+use crate::physical_device::{QUEUE_COUNT, QUEUE_FAMILIES};
 use crate::queue::Queue;
 use crate::registry;
 use crate::registry::features::{Features, SUPPORTED, extension_of};
@@ -26,7 +27,9 @@ pub(crate) struct Device {
     dump: Dump,
     sync: Arc<DeviceSync>,
     heap: Arc<Heap>,
-    queues: OnceLock<Vec<vk::Queue>>,
+    addresses: Arc<Addresses>,
+    /// Its queues, and the family of each.
+    queues: OnceLock<Vec<(u32, vk::Queue)>>,
 }
 
 objects! {
@@ -39,7 +42,7 @@ objects! {
 }
 
 impl Device {
-    /// Opens a device with `queue_count` queues.
+    /// Opens a device with a queue of each of these families.
     ///
     /// # Errors
     /// [`Error::InitializationFailed`] if the host gives no thread for a queue, or the environment makes no sense.
@@ -48,7 +51,7 @@ impl Device {
         extensions: Vec<&'static CStr>,
         features: Features,
         simulated: simdevice::Device,
-        queue_count: u32,
+        families: &[u32],
     ) -> Result<Arc<Self>, Error> {
         let device = Arc::new(Self {
             instance,
@@ -58,20 +61,25 @@ impl Device {
             dump: environment::dump()?,
             sync: Arc::default(),
             heap: Arc::new(Heap::new(memory::heap_size())),
+            addresses: Arc::default(),
             queues: OnceLock::new(),
         });
-        let start = |_| {
+        let start = |&family: &u32| {
             let processor = CommandProcessor::new(Arc::clone(&device.simulated));
-            Queue::start(
+            let queue = Queue::start(
                 Arc::clone(&device.instance),
                 Arc::clone(&device.sync),
                 processor,
-            )
+            );
+            queue.map(|queue| (family, queue))
         };
-        let queues: Vec<_> = (0..queue_count).map(start).collect::<Result<_, _>>()?;
-        device
-            .queues
-            .get_or_init(|| queues.into_iter().map(handle::create).collect());
+        let queues: Vec<_> = families.iter().map(start).collect::<Result<_, _>>()?;
+        device.queues.get_or_init(|| {
+            let queues = queues.into_iter();
+            queues
+                .map(|(family, queue)| (family, handle::create(queue)))
+                .collect()
+        });
         Ok(device)
     }
 
@@ -102,14 +110,22 @@ impl Device {
         Some((&self.heap, host_visible))
     }
 
-    /// The handle of queue `index`.
-    pub(crate) fn queue(&self, index: u32) -> Option<vk::Queue> {
-        self.queues().get(index as usize).copied()
+    /// The addresses of its buffers.
+    pub(crate) fn addresses(&self) -> &Arc<Addresses> {
+        &self.addresses
+    }
+
+    /// The handle of queue `index` of a family.
+    pub(crate) fn queue(&self, family: u32, index: u32) -> Option<vk::Queue> {
+        let queues = self.queues.get().map_or(&[][..], Vec::as_slice);
+        let mut of_family = queues.iter().filter(|(of, _)| *of == family);
+        of_family.nth(index as usize).map(|&(_, queue)| queue)
     }
 
     /// The handles of its queues.
-    pub(crate) fn queues(&self) -> &[vk::Queue] {
-        self.queues.get().map_or(&[], Vec::as_slice)
+    pub(crate) fn queues(&self) -> impl Iterator<Item = vk::Queue> {
+        let queues = self.queues.get().map_or(&[][..], Vec::as_slice);
+        queues.iter().map(|&(_, queue)| queue)
     }
 
     /// The version and extensions under which commands are looked up through this device.
@@ -122,7 +138,7 @@ impl Device {
 
     /// Executes what its queues were given and joins their threads.
     pub(crate) fn stop(&self) {
-        for &queue in self.queues() {
+        for queue in self.queues() {
             // SAFETY: the handle was made with the device and lives as long.
             match unsafe { handle::get(queue) } {
                 Ok(queue) => queue.stop(),
@@ -139,7 +155,7 @@ impl Device {
 
 impl Drop for Device {
     fn drop(&mut self) {
-        for &queue in self.queues() {
+        for queue in self.queues() {
             // SAFETY: the handle was made with the device, and the application may not use it once that is destroyed.
             if let Err(error) = unsafe { handle::destroy(queue) } {
                 log::error!("a queue's handle was overwritten: {error}");
@@ -231,29 +247,33 @@ impl PrivateDataSlot {
     }
 }
 
-/// The number of queues that are asked for.
-unsafe fn queue_count(info: &vk::DeviceCreateInfo<'_>) -> Result<u32, Error> {
+/// The families of the queues that are asked for, one for each queue.
+///
+/// # Safety
+/// The creation info is valid.
+unsafe fn queue_families(info: &vk::DeviceCreateInfo<'_>) -> Result<Vec<u32>, Error> {
     // SAFETY: the caller promises a valid creation info.
     let families =
         unsafe { valid::slice(info.p_queue_create_infos, info.queue_create_info_count)? };
+    let mut queues = Vec::new();
     for family in families {
-        if family.queue_family_index != QUEUE_FAMILY || family.queue_count > QUEUE_COUNT {
+        let exists = (family.queue_family_index as usize) < QUEUE_FAMILIES.len();
+        if !exists || family.queue_count > QUEUE_COUNT {
             return Err(Error::InitializationFailed(format!(
-                "{} queues of family {} were asked for; there is family {} with {}",
-                family.queue_count, family.queue_family_index, QUEUE_FAMILY, QUEUE_COUNT
+                "{} queues of family {} were asked for; there are {} families with {QUEUE_COUNT} each",
+                family.queue_count,
+                family.queue_family_index,
+                QUEUE_FAMILIES.len()
             )));
         }
+        queues.extend((0..family.queue_count).map(|_| family.queue_family_index));
         if !family.flags.is_empty() {
             return Err(Error::FeatureNotPresent(
                 "a queue's creation flag".to_owned(),
             ));
         }
     }
-    Ok(families
-        .iter()
-        .map(|family| family.queue_count)
-        .max()
-        .unwrap_or(0))
+    Ok(queues)
 }
 
 /// # Safety
@@ -277,7 +297,7 @@ pub(crate) unsafe fn create_device(
             extensions,
             features,
             environment::open_device()?,
-            queue_count(info)?,
+            &queue_families(info)?,
         )
     }
 }
@@ -296,11 +316,7 @@ pub(crate) fn get_device_queue(
     queue_family_index: u32,
     queue_index: u32,
 ) -> Result<vk::Queue, Error> {
-    let found = if queue_family_index == QUEUE_FAMILY {
-        device.queue(queue_index)
-    } else {
-        None
-    };
+    let found = device.queue(queue_family_index, queue_index);
     Ok(found.unwrap_or_default())
 }
 
@@ -322,7 +338,7 @@ pub(crate) fn get_device_queue2(
 
 #[doc(alias = "vkDeviceWaitIdle")]
 pub(crate) fn device_wait_idle(device: &Device) -> Result<(), Error> {
-    device.queues().iter().try_for_each(|&queue| {
+    device.queues().try_for_each(|queue| {
         // SAFETY: the handle was made with the device and lives as long.
         unsafe { handle::get(queue)? }.wait_idle()
     })
@@ -382,13 +398,7 @@ mod tests {
     use std::collections::HashMap;
 
     /// Features that Vulkan 1.3 requires of an implementation and that don't work yet; `driver/support.toml` says why.
-    const REQUIRED_BUT_MISSING: &[&str] = &[
-        "buffer_device_address",
-        "inline_uniform_block",
-        "multiview",
-        "pipeline_creation_cache_control",
-        "shader_integer_dot_product",
-    ];
+    const REQUIRED_BUT_MISSING: &[&str] = &["shader_integer_dot_product"];
 
     /// Counts the features that work of a structure.
     fn count<T: vk::TaggedStructure + Default>() -> usize {
@@ -427,9 +437,17 @@ mod tests {
             count::<vk::PhysicalDeviceTexelBufferAlignmentFeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceProvokingVertexFeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceVertexAttributeDivisorFeaturesKHR<'_>>(),
+            count::<vk::PhysicalDevice4444FormatsFeaturesEXT<'_>>(),
+            count::<vk::PhysicalDeviceBorderColorSwizzleFeaturesEXT<'_>>(),
+            count::<vk::PhysicalDeviceCustomBorderColorFeaturesEXT<'_>>(),
+            count::<vk::PhysicalDeviceDepthClipEnableFeaturesEXT<'_>>(),
+            count::<vk::PhysicalDeviceRobustness2FeaturesEXT<'_>>(),
             count::<PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>>(),
         ];
-        assert_eq!(counts, [37, 4, 32, 10, 1, 1, 1, 1, 1, 1, 2, 19]);
+        assert_eq!(
+            counts,
+            [38, 5, 43, 13, 1, 1, 1, 1, 1, 1, 2, 2, 2, 2, 1, 3, 19]
+        );
         assert_eq!(count_of(&SUPPORTED), counts.iter().sum::<usize>());
     }
 
@@ -478,10 +496,10 @@ mod tests {
         );
         let mut missing = vk::PhysicalDeviceVulkan13Features::default()
             .dynamic_rendering(true)
-            .inline_uniform_block(true);
+            .texture_compression_astc_hdr(true);
         refused(
             request(&vk::DeviceCreateInfo::default().push_next(&mut missing)),
-            "inline_uniform_block",
+            "texture_compression_astc_hdr",
         );
 
         let mut other = vk::PhysicalDevicePerformanceQueryFeaturesKHR::default()

@@ -11,6 +11,7 @@ mod command;
 mod convert;
 mod descriptor;
 mod device;
+mod device_addresses;
 mod device_sync;
 mod dispatch;
 mod instance;

@@ -46,6 +46,8 @@ pub(crate) struct Subpass {
     pub(crate) depth_stencil_resolve: Option<DepthStencilResolve>,
     /// Attachments that shaders read. Between subpasses they are in memory, so that they are images like any other.
     pub(crate) input: Vec<Option<usize>>,
+    /// The views that draws are for, a bit each; 0 in a pass without views.
+    pub(crate) view_mask: u32,
 }
 
 /// The resolve of a subpass's depth and stencil attachment.
@@ -67,6 +69,19 @@ impl Subpass {
         all.extend(self.depth_stencil);
         all.extend(self.depth_stencil_resolve.map(|resolve| resolve.attachment));
         all
+    }
+
+    /// The views that draws are for, a bit each; the first one in a pass without views.
+    fn views(&self) -> u32 {
+        match self.view_mask {
+            0 => 1,
+            mask => mask,
+        }
+    }
+
+    /// The layers of attachments that it renders to, of a framebuffer of so many layers.
+    pub(crate) fn layers(&self, framebuffer: u32) -> u32 {
+        layers(self.view_mask, framebuffer)
     }
 
     /// Tells if it uses attachment number `index`.
@@ -113,9 +128,19 @@ impl RenderPass {
         })
     }
 
-    /// Tells if `subpass` is the first to use attachment number `index`.
+    /// The views of attachment number `index` that `subpass` is the first to use, a bit each. A pass without views is as one
+    /// of one view.
+    pub(crate) fn first_views(&self, subpass: usize, index: usize) -> u32 {
+        let earlier = self.subpasses[..subpass].iter();
+        let used = earlier
+            .filter(|s| s.uses(index))
+            .fold(0, |used, s| used | s.views());
+        self.subpasses[subpass].views() & !used
+    }
+
+    /// Tells if `subpass` is the first to use attachment number `index`, in all of its views.
     pub(crate) fn is_first_use(&self, subpass: usize, index: usize) -> bool {
-        !self.subpasses[..subpass].iter().any(|s| s.uses(index))
+        self.first_views(subpass, index) == self.subpasses[subpass].views()
     }
 
     /// Tells if `subpass` is the last to use attachment number `index`.
@@ -123,14 +148,15 @@ impl RenderPass {
         !self.subpasses[subpass + 1..].iter().any(|s| s.uses(index))
     }
 
-    /// The attachments that `subpass` is the first to use, and only reads.
-    pub(crate) fn first_read(&self, subpass: usize) -> Vec<usize> {
+    /// The attachments that `subpass` is the first to use and only reads, or the first to use in some of its views: they
+    /// are loaded before it begins.
+    pub(crate) fn loaded_before(&self, subpass: usize) -> Vec<usize> {
         let Some(used) = self.subpasses.get(subpass) else {
             return Vec::new();
         };
         (0..self.attachments.len())
-            .filter(|&index| used.uses(index) && !used.writes(index))
-            .filter(|&index| self.is_first_use(subpass, index))
+            .filter(|&index| used.uses(index) && self.first_views(subpass, index) != 0)
+            .filter(|&index| !used.writes(index) || !self.is_first_use(subpass, index))
             .collect()
     }
 
@@ -163,13 +189,12 @@ fn used(attachment: u32) -> Option<usize> {
     (attachment != vk::ATTACHMENT_UNUSED).then_some(attachment as usize)
 }
 
-fn refuse_multiview(view_mask: u32) -> Result<(), Error> {
-    if view_mask == 0 {
-        return Ok(());
+/// The layers that attachments must have for views, or for `layers` without views.
+pub(crate) fn layers(view_mask: u32, layers: u32) -> u32 {
+    match view_mask {
+        0 => layers,
+        mask => u32::BITS - mask.leading_zeros(),
     }
-    Err(Error::FeatureNotPresent(
-        "a view mask (feature multiview)".into(),
-    ))
 }
 
 /// A subpass of `vkCreateRenderPass`.
@@ -198,6 +223,7 @@ unsafe fn new_subpass(subpass: &vk::SubpassDescription<'_>) -> Result<Subpass, E
         depth_stencil: depth_stencil.and_then(|r| used(r.attachment)),
         depth_stencil_resolve: None,
         input: all(input),
+        view_mask: 0,
     })
 }
 
@@ -206,7 +232,6 @@ unsafe fn new_subpass(subpass: &vk::SubpassDescription<'_>) -> Result<Subpass, E
 /// # Safety
 /// The description's pointers and chain are valid.
 unsafe fn new_subpass2(subpass: &vk::SubpassDescription2<'_>) -> Result<Subpass, Error> {
-    refuse_multiview(subpass.view_mask)?;
     // SAFETY: the caller's promise.
     let (color, resolve, input, depth_stencil, depth_stencil_resolve) = unsafe {
         let count = subpass.color_attachment_count;
@@ -232,6 +257,7 @@ unsafe fn new_subpass2(subpass: &vk::SubpassDescription2<'_>) -> Result<Subpass,
         depth_stencil: depth_stencil.and_then(|r| used(r.attachment)),
         depth_stencil_resolve,
         input: all(input),
+        view_mask: subpass.view_mask,
     })
 }
 
@@ -263,16 +289,21 @@ pub(crate) unsafe fn create_render_pass(
     let info = create_info;
     // SAFETY: the caller's promise.
     unsafe {
-        if let Some(multiview) =
-            valid::find_in_chain::<vk::RenderPassMultiviewCreateInfo>(info.p_next)
-        {
-            let masks = valid::slice(multiview.p_view_masks, multiview.subpass_count)?;
-            masks.iter().try_for_each(|&mask| refuse_multiview(mask))?;
-        }
+        let multiview = valid::find_in_chain::<vk::RenderPassMultiviewCreateInfo>(info.p_next);
+        let masks = match multiview {
+            Some(multiview) => valid::slice(multiview.p_view_masks, multiview.subpass_count)?,
+            None => &[],
+        };
         let attachments = valid::slice(info.p_attachments, info.attachment_count)?;
         let mut subpasses = simdevice::host::with_capacity(info.subpass_count as usize);
-        for subpass in valid::slice(info.p_subpasses, info.subpass_count)? {
-            subpasses.push(new_subpass(subpass)?);
+        for (index, subpass) in valid::slice(info.p_subpasses, info.subpass_count)?
+            .iter()
+            .enumerate()
+        {
+            subpasses.push(Subpass {
+                view_mask: masks.get(index).copied().unwrap_or(0),
+                ..new_subpass(subpass)?
+            });
         }
         let attachments = attachments.iter().map(|attachment| AttachmentDescription {
             format: attachment.format,
@@ -405,7 +436,7 @@ mod tests {
         assert!(pass.is_first_use(0, 2) && !pass.is_last_use(0, 2));
         assert!(!pass.is_first_use(1, 2) && pass.is_last_use(1, 2));
         assert!(!pass.is_last_use(0, 0) && pass.is_last_use(2, 0));
-        let read: Vec<_> = (0..4).map(|subpass| pass.first_read(subpass)).collect();
+        let read: Vec<_> = (0..4).map(|subpass| pass.loaded_before(subpass)).collect();
         assert_eq!(read, [vec![], vec![3], vec![], vec![]]);
         let outside = Subpass {
             input: vec![Some(1)],

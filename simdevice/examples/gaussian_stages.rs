@@ -219,6 +219,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let rendering = Rendering {
         area,
         layer_count: 1,
+        view_mask: 0,
         color: vec![Some(attachment(
             Format::R8G8B8A8Unorm,
             ClearValue::Float([0.0; 4]),

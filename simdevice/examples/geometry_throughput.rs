@@ -205,6 +205,7 @@ fn measure(name: &str, device: &Arc<Device>, draw: &Draw) {
         let rendering = Rendering {
             area: draw.state.scissors[0],
             layer_count: 1,
+            view_mask: 0,
             color: vec![Some(attachment)],
             depth: None,
             stencil: None,

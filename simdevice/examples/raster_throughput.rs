@@ -296,6 +296,7 @@ fn measure(device: &Arc<Device>, scene: &Scene) {
             height: HEIGHT,
         },
         layer_count: 1,
+        view_mask: 0,
         color: vec![Some(attachment(
             Format::R8G8B8A8Unorm,
             ClearValue::Float([0.0; 4]),

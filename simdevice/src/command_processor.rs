@@ -221,6 +221,12 @@ impl CommandProcessor {
                         .end(self.device.runtime(), &mut self.counters, area);
                 }
                 pool.end(*index, &self.counters);
+                // The first of the queries of all views has what all of them measured; the others have nothing.
+                for further in self.further_views() {
+                    let index = index.saturating_add(further);
+                    pool.begin(index, &self.counters);
+                    pool.end(index, &self.counters);
+                }
                 Ok(())
             }
             Packet::ResetQueries { pool, first, count } => {
@@ -231,6 +237,9 @@ impl CommandProcessor {
                 self.flush()?;
                 let now = self.now();
                 pool.write_timestamp(*index, now);
+                for further in self.further_views() {
+                    pool.write_timestamp(index.saturating_add(further), now);
+                }
                 Ok(())
             }
         }
@@ -259,13 +268,29 @@ impl CommandProcessor {
         Ok(pass.push(draw, self.device.runtime(), &mut self.counters)?)
     }
 
-    /// Points, lines or triangles, part by part.
+    /// The views of the pass but one, counted from 1; none without views.
+    fn further_views(&self) -> std::ops::Range<u32> {
+        let views = self.pass.as_ref().map_or(1, |pass| pass.views().count());
+        1..views as u32
+    }
+
+    /// Points, lines or triangles, view by view.
     fn primitives(&mut self, draw: &Draw) -> Result<(), ExecutionError> {
+        let pass = self.pass.as_ref().ok_or(ExecutionError::OutsidePass)?;
+        for view in pass.views() {
+            self.primitives_of_view(draw, view)?;
+        }
+        Ok(())
+    }
+
+    /// Points, lines or triangles of a view, or of the layers that they say, part by part.
+    fn primitives_of_view(&mut self, draw: &Draw, view: Option<u32>) -> Result<(), ExecutionError> {
         let pass = self.pass.as_ref().ok_or(ExecutionError::OutsidePass)?;
         self.outside_gaussian_set()?;
         let surface = Surface {
             area: pass.area(),
             layers: pass.layer_count(),
+            view,
             depth: pass.depth_format(),
         };
         let device = Arc::clone(&self.device);

@@ -62,6 +62,8 @@ type Resolve = (Target, ResolveMode);
 pub struct Pass {
     area: Rect,
     layer_count: u32,
+    /// The layers that are views, a bit each, if any are.
+    view_mask: u32,
     color: Vec<Option<Target>>,
     depth: Option<Target>,
     stencil: Option<Target>,
@@ -105,6 +107,7 @@ impl Pass {
         let mut pass = Self {
             area: rendering.area,
             layer_count: rendering.layer_count.max(1),
+            view_mask: rendering.view_mask,
             color: rendering
                 .color
                 .iter()
@@ -163,6 +166,19 @@ impl Pass {
     /// How many layers are rendered.
     pub fn layer_count(&self) -> u32 {
         self.layer_count
+    }
+
+    /// The views that each draw is for, by their layers; one `None` if draws say their layers.
+    pub fn views(&self) -> impl Iterator<Item = Option<u32>> + use<> {
+        let mask = self.view_mask;
+        let views = (0..u32::BITS).filter(move |view| mask & (1 << view) != 0);
+        let none = (mask == 0).then_some(None);
+        none.into_iter().chain(views.map(Some))
+    }
+
+    /// Tells if a layer is rendered: without views every one is.
+    fn renders(&self, layer: u32) -> bool {
+        self.view_mask == 0 || 1u32.checked_shl(layer).unwrap_or(0) & self.view_mask != 0
     }
 
     /// The depth attachment's format, if there is one.
@@ -422,6 +438,9 @@ impl Flush<'_> {
         at: [u32; 2],
     ) -> Result<(), Stopped> {
         let pass = self.pass;
+        if !pass.renders(layer) {
+            return Ok(());
+        }
         let size = self.runtime.config().macro_tile_size;
         let tiles = || Tile::of_macro_tile(size, at, pass.area);
         for draw in &self.draws {
@@ -517,9 +536,11 @@ impl Flush<'_> {
     fn clear(&self, worker: &mut Worker, clear: &ClearAttachments, layer: u32, tile: &Tile) {
         let pass = self.pass;
         for &(rect, first_layer, layers) in &clear.rects {
-            let in_layers = layer
-                .checked_sub(first_layer)
-                .is_some_and(|index| index < layers);
+            // A clear in a pass with views is for all of them.
+            let in_layers = pass.view_mask != 0
+                || layer
+                    .checked_sub(first_layer)
+                    .is_some_and(|index| index < layers);
             if !in_layers || tile.pixels.intersect(rect).is_empty() {
                 continue;
             }
@@ -568,6 +589,7 @@ mod tests {
                 height: 30,
             },
             layer_count,
+            view_mask: 0,
             color: Vec::new(),
             depth: None,
             stencil: None,

@@ -1,3 +1,13 @@
-//! The driver as the Vulkan loader and its layers find it.
+//! The driver as the Vulkan loader and its layers find it; and the limits, features and extensions that strangers' programs ask
+//! for, each held against what a program gets of it.
 
+mod addresses;
+mod depth_clip;
+mod descriptors;
+mod limits;
 mod loader_door;
+mod multiview;
+mod pipelines;
+mod queues;
+mod robustness;
+mod samplers;

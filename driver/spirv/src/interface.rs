@@ -251,6 +251,8 @@ pub struct Interface {
     pub per_sample: bool,
     /// It stores to buffers or images, or uses atomics: it can't be skipped.
     pub has_side_effects: bool,
+    /// It reaches memory by device addresses.
+    pub uses_addresses: bool,
 }
 
 impl Interface {

@@ -145,7 +145,8 @@ impl ImageType {
         }
         Ok(ImageShape {
             dimension,
-            arrayed: self.arrayed || storage_cube,
+            // An input attachment is read in the layer that is rendered to.
+            arrayed: self.arrayed || storage_cube || self.dim == Dim::DimSubpassData,
             multisampled: self.multisampled,
         })
     }

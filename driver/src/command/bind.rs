@@ -3,6 +3,7 @@
 use super::buffer::Recorder;
 use super::{BindPoint, BindSets, BoundSet, Command, IndexBuffer, PushDescriptors, VertexBuffer};
 use crate::abi::error::Error;
+use crate::abi::handle;
 use crate::descriptor::layout::DescriptorSetLayout;
 use crate::descriptor::set::{self, DescriptorSet, UpdateTemplate};
 use crate::physical_device::limits;
@@ -10,6 +11,8 @@ use crate::pipeline::Pipeline;
 use crate::pipeline::layout::PipelineLayout;
 use crate::resource::buffer::{Buffer, BufferRules};
 use ash::vk;
+use simdevice::Allocation;
+use simdevice::packet::BufferRange;
 use std::ffi::c_void;
 use std::sync::Arc;
 
@@ -37,27 +40,44 @@ pub(crate) fn cmd_bind_pipeline(
     Ok(())
 }
 
+/// # Safety
+/// The buffers are live, or null.
 #[doc(alias = "vkCmdBindVertexBuffers")]
-pub(crate) fn cmd_bind_vertex_buffers(
+pub(crate) unsafe fn cmd_bind_vertex_buffers(
     recorder: &mut Recorder,
     first_binding: u32,
-    buffers: &[Arc<Buffer>],
+    buffers: &[vk::Buffer],
     offsets: &[vk::DeviceSize],
 ) -> Result<(), Error> {
-    bind_vertex_buffers(recorder, first_binding, buffers, offsets, &[], &[])
+    // SAFETY: the caller's promise.
+    unsafe { bind_vertex_buffers(recorder, first_binding, buffers, offsets, &[], &[]) }
 }
 
+/// # Safety
+/// The buffers are live, or null.
 #[doc(alias = "vkCmdBindVertexBuffers2")]
-pub(crate) fn cmd_bind_vertex_buffers2(
+pub(crate) unsafe fn cmd_bind_vertex_buffers2(
     recorder: &mut Recorder,
     first_binding: u32,
-    buffers: &[Arc<Buffer>],
+    buffers: &[vk::Buffer],
     offsets: &[vk::DeviceSize],
     sizes: Option<&[vk::DeviceSize]>,
     strides: Option<&[vk::DeviceSize]>,
 ) -> Result<(), Error> {
     let (sizes, strides) = (sizes.unwrap_or_default(), strides.unwrap_or_default());
-    bind_vertex_buffers(recorder, first_binding, buffers, offsets, sizes, strides)
+    // SAFETY: the caller's promise.
+    unsafe { bind_vertex_buffers(recorder, first_binding, buffers, offsets, sizes, strides) }
+}
+
+/// No bytes: what a null buffer has.
+fn nothing() -> Result<BufferRange, Error> {
+    let memory =
+        Allocation::new_zeroed(1).map_err(|error| Error::OutOfDeviceMemory(error.to_string()))?;
+    Ok(BufferRange {
+        memory,
+        offset: 0,
+        size: 0,
+    })
 }
 
 /// The rules on the buffer of `vkCmdBindIndexBuffer`.
@@ -92,11 +112,14 @@ pub(crate) fn cmd_bind_index_buffer(
     Ok(())
 }
 
-/// Records vertex buffers; `sizes` and `strides` are empty or have one for each.
-fn bind_vertex_buffers(
+/// Records vertex buffers; `sizes` and `strides` are empty or have one for each. From a null buffer vertices read zero.
+///
+/// # Safety
+/// The buffers are live, or null.
+unsafe fn bind_vertex_buffers(
     recorder: &mut Recorder,
     first: u32,
-    buffers: &[Arc<Buffer>],
+    buffers: &[vk::Buffer],
     offsets: &[vk::DeviceSize],
     sizes: &[vk::DeviceSize],
     strides: &[vk::DeviceSize],
@@ -109,14 +132,18 @@ fn bind_vertex_buffers(
         ));
     }
     let mut bound = simdevice::host::with_capacity(buffers.len());
-    for (index, (buffer, &offset)) in buffers.iter().zip(offsets).enumerate() {
+    for (index, (&buffer, &offset)) in buffers.iter().zip(offsets).enumerate() {
         let size = sizes.get(index).copied().unwrap_or(vk::WHOLE_SIZE);
+        // SAFETY: the caller's promise.
+        let range = match unsafe { handle::get_optional(buffer)? } {
+            Some(buffer) => {
+                let size = (size != vk::WHOLE_SIZE).then_some(size);
+                buffer.range(offset, size, &VERTEX_BUFFERS)?
+            }
+            None => nothing()?,
+        };
         bound.push(VertexBuffer {
-            range: buffer.range(
-                offset,
-                (size != vk::WHOLE_SIZE).then_some(size),
-                &VERTEX_BUFFERS,
-            )?,
+            range,
             stride: strides.get(index).map(|&stride| stride as u32),
         });
     }

@@ -655,7 +655,7 @@ mod tests {
         let instance = Instance::new(vk::API_VERSION_1_3, &[]).unwrap();
         let simulated = simdevice::Device::new(&simdevice::Config::default()).unwrap();
         let features = Features::NONE;
-        let device = Device::new(instance, Vec::new(), features, simulated, 0).unwrap();
+        let device = Device::new(instance, Vec::new(), features, simulated, &[]).unwrap();
         let buffer = CommandBuffer {
             device,
             level: vk::CommandBufferLevel::PRIMARY,

@@ -79,11 +79,6 @@ unsafe fn render_pass_instance(
 /// # Safety
 /// The info and its handles are valid.
 unsafe fn dynamic_rendering(info: &vk::RenderingInfo<'_>) -> Result<DynamicRendering, Error> {
-    if info.view_mask != 0 {
-        return Err(Error::FeatureNotPresent(
-            "a view mask (feature multiview)".into(),
-        ));
-    }
     // SAFETY: the caller's promise.
     unsafe {
         let color = valid::slice(info.p_color_attachments, info.color_attachment_count)?;
@@ -95,6 +90,7 @@ unsafe fn dynamic_rendering(info: &vk::RenderingInfo<'_>) -> Result<DynamicRende
             flags: info.flags,
             area: info.render_area,
             layers: info.layer_count,
+            view_mask: info.view_mask,
             color: color
                 .iter()
                 .map(|info| attachment(info))

@@ -6,7 +6,7 @@ mod tests;
 
 use crate::abi::error::Error;
 use crate::convert::{clear_value, rect};
-use crate::render_pass::{AttachmentDescription, RenderPass};
+use crate::render_pass::{AttachmentDescription, RenderPass, layers};
 use crate::resource::image::ImageView;
 use ash::vk;
 use simdevice::format::{Aspect, ClearValue};
@@ -42,9 +42,10 @@ fn check_attachment(view: &ImageView, aspect: Aspect, layers: u32) -> Result<(),
 /// The operation of an attachment at the beginning of a pass.
 fn load(op: vk::AttachmentLoadOp, clear: impl FnOnce() -> ClearValue) -> Result<LoadOp, Error> {
     match op {
-        vk::AttachmentLoadOp::LOAD => Ok(LoadOp::Load),
+        // An attachment that nobody may rely on being loaded keeps what is outside of draws.
+        vk::AttachmentLoadOp::LOAD | vk::AttachmentLoadOp::NONE_KHR => Ok(LoadOp::Load),
         vk::AttachmentLoadOp::CLEAR => Ok(LoadOp::Clear(clear())),
-        vk::AttachmentLoadOp::DONT_CARE | vk::AttachmentLoadOp::NONE_KHR => Ok(LoadOp::DontCare),
+        vk::AttachmentLoadOp::DONT_CARE => Ok(LoadOp::DontCare),
         other => Err(Error::usage(
             "VUID-VkRenderingAttachmentInfo-loadOp-parameter",
             format!("{other:?} is not a VkAttachmentLoadOp"),
@@ -153,20 +154,25 @@ impl RenderPassInstance {
         };
         begin(Rendering {
             area: self.area,
-            layer_count: self.layers,
+            layer_count: subpass.layers(self.layers),
+            view_mask: subpass.view_mask,
             color: color.collect::<Result<_, _>>()?,
             depth: depth_stencil(Aspect::Depth, main_ops)?,
             stencil: depth_stencil(Aspect::Stencil, stencil_ops)?,
         })
     }
 
-    /// The packets that clear what a subpass reads before anything was rendered to it.
+    /// The packets that clear what a subpass reads before anything was rendered to it, and what it is the first to use in
+    /// some of its views.
     ///
     /// # Errors
     /// [`Error::InvalidUsage`] if a view is missing.
     pub(crate) fn clears_before_reads(&self, index: usize) -> Result<Vec<Packet>, Error> {
         let mut packets = Vec::new();
-        for number in self.render_pass.first_read(index) {
+        let Some(subpass) = self.render_pass.subpasses.get(index) else {
+            return Ok(packets);
+        };
+        for number in self.render_pass.loaded_before(index) {
             let Some(format) = self.format(number) else {
                 continue;
             };
@@ -185,13 +191,19 @@ impl RenderPassInstance {
             if attachments.iter().all(Option::is_none) {
                 continue;
             }
+            let value = self.clear_value(self.view(number)?, number);
             for attachment in attachments.iter_mut().flatten() {
+                attachment.load = LoadOp::Clear(value);
                 attachment.store = StoreOp::Store;
             }
             let [color, depth, stencil] = attachments;
             packets.push(Packet::BeginRendering(Box::new(Rendering {
                 area: self.area,
-                layer_count: self.layers,
+                layer_count: subpass.layers(self.layers),
+                view_mask: match subpass.view_mask {
+                    0 => 0,
+                    _ => self.render_pass.first_views(index, number),
+                },
                 color: vec![color],
                 depth,
                 stencil,
@@ -215,6 +227,12 @@ impl RenderPassInstance {
         })
     }
 
+    /// The value that an attachment is cleared to. One that is missing is the application's error; zero is as good as any.
+    fn clear_value(&self, view: &ImageView, number: usize) -> ClearValue {
+        let value = self.clear_values.get(number).copied().unwrap_or_default();
+        clear_value(view.view.format, value)
+    }
+
     /// An attachment and, if it is resolved, the attachment that it is resolved to and how.
     fn attachment(
         &self,
@@ -225,19 +243,16 @@ impl RenderPassInstance {
         resolve: Option<(usize, ResolveMode)>,
     ) -> Result<Attachment, Error> {
         let view = self.view(number)?;
-        check_attachment(view, aspect, self.layers)?;
+        let layers = self.render_pass.subpasses[subpass].layers(self.layers);
+        check_attachment(view, aspect, layers)?;
         let resolve = resolve.map(|(number, mode)| {
             let to = self.view(number)?;
-            check_attachment(to, aspect, self.layers)?;
+            check_attachment(to, aspect, layers)?;
             check_resolve(view, to)?;
             Ok::<_, Error>((to.view.clone(), mode))
         });
         let (load_op, store_op) = ops(&self.render_pass.attachments[number]);
-        // A clear value that is missing is the application's error; zero is as good as any.
-        let clear = || {
-            let value = self.clear_values.get(number).copied().unwrap_or_default();
-            clear_value(view.view.format, value)
-        };
+        let clear = || self.clear_value(view, number);
         Ok(Attachment {
             view: view.view.clone(),
             load: if self.render_pass.is_first_use(subpass, number) {
@@ -291,6 +306,8 @@ pub(crate) struct DynamicRendering {
     pub(crate) area: vk::Rect2D,
     /// The layers rendered.
     pub(crate) layers: u32,
+    /// The views that draws are for, a bit each; 0 without views.
+    pub(crate) view_mask: u32,
     /// Colour attachments by location.
     pub(crate) color: Vec<Option<DynamicAttachment>>,
     /// The depth attachment.
@@ -313,7 +330,8 @@ impl DynamicRendering {
         };
         begin(Rendering {
             area: rect(self.area),
-            layer_count: self.layers,
+            layer_count: layers(self.view_mask, self.layers),
+            view_mask: self.view_mask,
             color: self
                 .color
                 .iter()
@@ -330,12 +348,13 @@ impl DynamicRendering {
         attachment: &DynamicAttachment,
         aspect: Aspect,
     ) -> Result<Attachment, Error> {
-        check_attachment(&attachment.view, aspect, self.layers)?;
+        let layers = layers(self.view_mask, self.layers);
+        check_attachment(&attachment.view, aspect, layers)?;
         // What is suspended is resolved where it ends.
         let suspends = self.flags.contains(vk::RenderingFlags::SUSPENDING);
         let resolve = attachment.resolve.as_ref().filter(|_| !suspends);
         let resolve = resolve.map(|(view, mode)| {
-            check_attachment(view, aspect, self.layers)?;
+            check_attachment(view, aspect, layers)?;
             check_resolve(&attachment.view, view)?;
             Ok::<_, Error>((view.view.clone(), *mode))
         });

@@ -25,6 +25,8 @@ pub(crate) struct BindingInfo {
     pub(crate) stages: vk::ShaderStageFlags,
     /// Samplers that never change, one for each descriptor; or empty.
     pub(crate) immutable_samplers: Vec<Arc<Sampler>>,
+    /// The rules on its descriptors.
+    pub(crate) flags: vk::DescriptorBindingFlags,
 }
 
 /// A binding in its set.
@@ -32,8 +34,10 @@ pub(crate) struct BindingInfo {
 pub(crate) struct LayoutBinding {
     /// The kind of its descriptors.
     pub(crate) kind: vk::DescriptorType,
-    /// The number of descriptors that it has.
+    /// The number of descriptors that it has; of a variable count, the most.
     pub(crate) count: u32,
+    /// The bytes of an inline uniform block, which is one descriptor; of a variable count, the most. 0 for all other kinds.
+    pub(crate) inline_bytes: u32,
     /// The stages that may use it.
     pub(crate) stages: vk::ShaderStageFlags,
     /// Samplers that never change, one for each descriptor; or empty.
@@ -50,7 +54,8 @@ pub(crate) struct DescriptorSetLayout {
     bindings: BTreeMap<u32, LayoutBinding>,
     count: usize,
     dynamic_count: usize,
-    is_push: bool,
+    flags: vk::DescriptorSetLayoutCreateFlags,
+    has_variable_count: bool,
 }
 
 objects! { vk::DescriptorSetLayout => DescriptorSetLayout; }
@@ -78,17 +83,22 @@ pub(crate) fn is_supported(kind: vk::DescriptorType) -> bool {
             | vk::DescriptorType::UNIFORM_BUFFER_DYNAMIC
             | vk::DescriptorType::STORAGE_BUFFER_DYNAMIC
             | vk::DescriptorType::INPUT_ATTACHMENT
+            | vk::DescriptorType::INLINE_UNIFORM_BLOCK
     )
 }
 
 impl DescriptorSetLayout {
-    /// A layout of bindings; `is_push` if its sets are pushed by commands rather than allocated.
+    /// A layout of bindings, with flags that say how its sets come to be and are updated.
     ///
     /// # Errors
     /// [`Error::FeatureNotPresent`] for a kind of descriptor that there isn't, or too many of them;
-    /// [`Error::InvalidUsage`] if two bindings have one number.
-    pub(crate) fn new(infos: Vec<BindingInfo>, is_push: bool) -> Result<Self, Error> {
+    /// [`Error::InvalidUsage`] if two bindings have one number, or bindings don't go with their flags.
+    pub(crate) fn new(
+        infos: Vec<BindingInfo>,
+        flags: vk::DescriptorSetLayoutCreateFlags,
+    ) -> Result<Self, Error> {
         let mut sorted = BTreeMap::new();
+        check_flags(&infos, flags)?;
         for info in infos {
             if !is_supported(info.kind) && info.count > 0 {
                 return Err(Error::FeatureNotPresent(format!(
@@ -104,7 +114,16 @@ impl DescriptorSetLayout {
                 ));
             }
         }
-        let total: u64 = sorted.values().map(|info| u64::from(info.count)).sum();
+        let slots = |info: &BindingInfo| match info.kind {
+            vk::DescriptorType::INLINE_UNIFORM_BLOCK => info.count.min(1),
+            _ => info.count,
+        };
+        let variable = vk::DescriptorBindingFlags::VARIABLE_DESCRIPTOR_COUNT;
+        let has_variable_count = sorted
+            .values()
+            .next_back()
+            .is_some_and(|info| info.flags.contains(variable));
+        let total: u64 = sorted.values().map(|info| u64::from(slots(info))).sum();
         if total > u64::from(MAX_DESCRIPTORS) {
             return Err(Error::FeatureNotPresent(format!(
                 "a descriptor set of {total} descriptors (there may be {MAX_DESCRIPTORS})"
@@ -114,11 +133,16 @@ impl DescriptorSetLayout {
         let place = |(number, info): (u32, BindingInfo)| {
             let (first, first_dynamic) = (count, dynamic_count);
             let dynamic = is_dynamic(info.kind);
-            count += info.count as usize;
+            let held = slots(&info);
+            count += held as usize;
             dynamic_count += if dynamic { info.count as usize } else { 0 };
             let binding = LayoutBinding {
                 kind: info.kind,
-                count: info.count,
+                count: held,
+                inline_bytes: match info.kind {
+                    vk::DescriptorType::INLINE_UNIFORM_BLOCK => info.count,
+                    _ => 0,
+                },
                 stages: info.stages,
                 immutable_samplers: info.immutable_samplers,
                 first,
@@ -131,7 +155,31 @@ impl DescriptorSetLayout {
             bindings,
             count,
             dynamic_count,
-            is_push,
+            flags,
+            has_variable_count,
+        })
+    }
+
+    /// The binding whose sets choose their number of descriptors, or of bytes: the last one, if any.
+    pub(crate) fn variable_binding(&self) -> Option<&LayoutBinding> {
+        let last = self.bindings.values().next_back();
+        last.filter(|_| self.has_variable_count)
+    }
+
+    /// The kinds of a set's descriptors with how many it takes of its pool, bytes of inline uniform blocks, if it has
+    /// `variable_count` of the binding that leaves its number open.
+    pub(crate) fn kinds(
+        &self,
+        variable_count: u32,
+    ) -> impl Iterator<Item = (vk::DescriptorType, u64)> {
+        let last = self.variable_binding().map(|binding| binding.first);
+        self.bindings.values().map(move |binding| {
+            let most = binding.count.max(binding.inline_bytes);
+            let taken = match last {
+                Some(first) if first == binding.first => variable_count.min(most),
+                _ => most,
+            };
+            (binding.kind, u64::from(taken))
         })
     }
 
@@ -168,7 +216,14 @@ impl DescriptorSetLayout {
 
     /// Tells if its sets are pushed rather than allocated.
     pub(crate) fn is_push(&self) -> bool {
-        self.is_push
+        self.flags
+            .contains(vk::DescriptorSetLayoutCreateFlags::PUSH_DESCRIPTOR_KHR)
+    }
+
+    /// Tells if its sets may be updated after they were bound.
+    pub(crate) fn is_updated_after_bind(&self) -> bool {
+        self.flags
+            .contains(vk::DescriptorSetLayoutCreateFlags::UPDATE_AFTER_BIND_POOL)
     }
 
     /// The index in the set of element `element` of binding `number`, which may lie beyond the binding.
@@ -187,6 +242,80 @@ impl DescriptorSetLayout {
     }
 }
 
+/// Checks that bindings go with their flags and with those of their layout.
+fn check_flags(
+    infos: &[BindingInfo],
+    flags: vk::DescriptorSetLayoutCreateFlags,
+) -> Result<(), Error> {
+    let is_push = flags.contains(vk::DescriptorSetLayoutCreateFlags::PUSH_DESCRIPTOR_KHR);
+    let after_bind = vk::DescriptorBindingFlags::UPDATE_AFTER_BIND;
+    let updates_after_bind = infos.iter().any(|info| info.flags.contains(after_bind));
+    let pool = vk::DescriptorSetLayoutCreateFlags::UPDATE_AFTER_BIND_POOL;
+    if updates_after_bind && !flags.contains(pool) {
+        return Err(Error::usage(
+            "VUID-VkDescriptorSetLayoutCreateInfo-flags-03000",
+            "a binding is updated after bind, and its layout is not for pools of such sets",
+        ));
+    }
+    if updates_after_bind && infos.iter().any(|info| is_dynamic(info.kind)) {
+        return Err(Error::usage(
+            "VUID-VkDescriptorSetLayoutCreateInfo-descriptorType-03001",
+            "a layout has both bindings that are updated after bind and dynamic offsets",
+        ));
+    }
+    for info in infos {
+        let is_inline = info.kind == vk::DescriptorType::INLINE_UNIFORM_BLOCK;
+        if is_inline && is_push {
+            return Err(Error::usage(
+                "VUID-VkDescriptorSetLayoutCreateInfo-flags-02208",
+                "an inline uniform block is pushed",
+            ));
+        }
+        if is_inline && info.count % 4 != 0 {
+            return Err(Error::usage(
+                "VUID-VkDescriptorSetLayoutBinding-descriptorType-02209",
+                format!("an inline uniform block of {} bytes", info.count),
+            ));
+        }
+        if is_inline && info.count > limits::MAX_INLINE_UNIFORM_BLOCK_SIZE {
+            return Err(Error::usage(
+                "VUID-VkDescriptorSetLayoutBinding-descriptorType-08004",
+                format!(
+                    "an inline uniform block of {} bytes; it may have {}",
+                    info.count,
+                    limits::MAX_INLINE_UNIFORM_BLOCK_SIZE
+                ),
+            ));
+        }
+        if info
+            .flags
+            .contains(vk::DescriptorBindingFlags::VARIABLE_DESCRIPTOR_COUNT)
+            && is_dynamic(info.kind)
+        {
+            return Err(Error::usage(
+                "VUID-VkDescriptorSetLayoutBindingFlagsCreateInfo-pBindingFlags-03015",
+                "a binding of dynamic offsets has a variable count",
+            ));
+        }
+    }
+    let last = infos.iter().map(|info| info.number).max();
+    let is_elsewhere = |info: &BindingInfo| {
+        info.flags
+            .contains(vk::DescriptorBindingFlags::VARIABLE_DESCRIPTOR_COUNT)
+            && Some(info.number) != last
+    };
+    if let Some(info) = infos.iter().find(|info| is_elsewhere(info)) {
+        return Err(Error::usage(
+            "VUID-VkDescriptorSetLayoutBindingFlagsCreateInfo-pBindingFlags-03004",
+            format!(
+                "binding {} has a variable count and is not the last",
+                info.number
+            ),
+        ));
+    }
+    Ok(())
+}
+
 /// The layout that a create info asks for.
 ///
 /// # Safety
@@ -197,7 +326,8 @@ unsafe fn new_layout(
     let is_push = info
         .flags
         .contains(vk::DescriptorSetLayoutCreateFlags::PUSH_DESCRIPTOR_KHR);
-    let known = vk::DescriptorSetLayoutCreateFlags::PUSH_DESCRIPTOR_KHR;
+    let known = vk::DescriptorSetLayoutCreateFlags::PUSH_DESCRIPTOR_KHR
+        | vk::DescriptorSetLayoutCreateFlags::UPDATE_AFTER_BIND_POOL;
     if !known.contains(info.flags) {
         return Err(Error::FeatureNotPresent(format!(
             "a descriptor set layout with flags {:?}",
@@ -206,12 +336,16 @@ unsafe fn new_layout(
     }
     // SAFETY: the caller's promise.
     unsafe {
+        let mut binding_flags: &[vk::DescriptorBindingFlags] = &[];
         if let Some(flags) =
             valid::find_in_chain::<vk::DescriptorSetLayoutBindingFlagsCreateInfo<'_>>(info.p_next)
         {
             let flags = valid::slice(flags.p_binding_flags, flags.binding_count)?;
             let known = vk::DescriptorBindingFlags::PARTIALLY_BOUND
-                | vk::DescriptorBindingFlags::UPDATE_UNUSED_WHILE_PENDING;
+                | vk::DescriptorBindingFlags::UPDATE_UNUSED_WHILE_PENDING
+                | vk::DescriptorBindingFlags::UPDATE_AFTER_BIND
+                | vk::DescriptorBindingFlags::VARIABLE_DESCRIPTOR_COUNT;
+            binding_flags = flags;
             if let Some(flags) = flags.iter().find(|&&flags| !known.contains(flags)) {
                 return Err(Error::FeatureNotPresent(format!(
                     "a descriptor binding with flags {flags:?}"
@@ -219,8 +353,11 @@ unsafe fn new_layout(
             }
         }
         let bindings = valid::slice(info.p_bindings, info.binding_count)?;
-        let bindings = bindings.iter().map(|binding| binding_info(binding));
-        let layout = DescriptorSetLayout::new(bindings.collect::<Result<_, _>>()?, is_push)?;
+        let bindings = bindings.iter().enumerate().map(|(index, binding)| {
+            let flags = binding_flags.get(index).copied().unwrap_or_default();
+            binding_info(binding, flags)
+        });
+        let layout = DescriptorSetLayout::new(bindings.collect::<Result<_, _>>()?, info.flags)?;
         if is_push && layout.count() > limits::MAX_PUSH_DESCRIPTORS as usize {
             return Err(Error::usage(
                 "VUID-VkDescriptorSetLayoutCreateInfo-flags-00281",
@@ -239,7 +376,10 @@ unsafe fn new_layout(
 ///
 /// # Safety
 /// The binding is valid.
-unsafe fn binding_info(binding: &vk::DescriptorSetLayoutBinding<'_>) -> Result<BindingInfo, Error> {
+unsafe fn binding_info(
+    binding: &vk::DescriptorSetLayoutBinding<'_>,
+    flags: vk::DescriptorBindingFlags,
+) -> Result<BindingInfo, Error> {
     let has_samplers = matches!(
         binding.descriptor_type,
         vk::DescriptorType::SAMPLER | vk::DescriptorType::COMBINED_IMAGE_SAMPLER
@@ -259,6 +399,7 @@ unsafe fn binding_info(binding: &vk::DescriptorSetLayoutBinding<'_>) -> Result<B
         count: binding.descriptor_count,
         stages: binding.stage_flags,
         immutable_samplers,
+        flags,
     })
 }
 
@@ -283,12 +424,16 @@ pub(crate) unsafe fn get_descriptor_set_layout_support(
     let layout = unsafe { new_layout(create_info) };
     // A layout that is refused for another reason than its size has no answer but this.
     let most = limits::MAX_PER_SET_DESCRIPTORS as usize;
-    support.supported = layout.is_ok_and(|layout| layout.count() <= most).into();
+    let layout = layout.ok().filter(|layout| layout.count() <= most);
+    support.supported = layout.is_some().into();
+    // A binding of a variable count may have as many as the layout says, since the layout is supported.
+    let variable = layout.as_ref().and_then(|layout| layout.variable_binding());
+    let max_variable_count = variable.map_or(0, |binding| binding.count.max(binding.inline_bytes));
     support.for_each_chained(|mut structure| {
         if let Some(variable) =
             structure.cast::<vk::DescriptorSetVariableDescriptorCountLayoutSupport<'_>>()
         {
-            variable.max_variable_descriptor_count = 0;
+            variable.max_variable_descriptor_count = max_variable_count;
         }
     });
     Ok(())
@@ -305,8 +450,11 @@ mod tests {
             count,
             stages: vk::ShaderStageFlags::ALL,
             immutable_samplers: Vec::new(),
+            flags: vk::DescriptorBindingFlags::empty(),
         }
     }
+
+    const NONE: vk::DescriptorSetLayoutCreateFlags = vk::DescriptorSetLayoutCreateFlags::empty();
 
     #[test]
     fn bindings_follow_each_other_by_number() {
@@ -317,7 +465,7 @@ mod tests {
             info(2, vk::DescriptorType::UNIFORM_BUFFER, 3),
             info(1, dynamic, 1),
         ];
-        let layout = DescriptorSetLayout::new(infos, false).unwrap();
+        let layout = DescriptorSetLayout::new(infos, NONE).unwrap();
         assert_eq!((layout.count(), layout.dynamic_count()), (6, 3));
         assert_eq!(layout.index(2, 1).unwrap(), 2);
         assert_eq!(layout.index(9, 0).unwrap(), 4);
@@ -331,10 +479,10 @@ mod tests {
     fn what_cannot_be_is_refused() {
         let kind = vk::DescriptorType::STORAGE_BUFFER;
         let twice = vec![info(1, kind, 1), info(1, kind, 1)];
-        assert!(DescriptorSetLayout::new(twice, false).is_err());
+        assert!(DescriptorSetLayout::new(twice, NONE).is_err());
         let many = vec![info(1, kind, u32::MAX), info(2, kind, u32::MAX)];
-        assert!(DescriptorSetLayout::new(many, false).is_err());
+        assert!(DescriptorSetLayout::new(many, NONE).is_err());
         let unknown = vec![info(1, vk::DescriptorType::MUTABLE_EXT, 1)];
-        assert!(DescriptorSetLayout::new(unknown, false).is_err());
+        assert!(DescriptorSetLayout::new(unknown, NONE).is_err());
     }
 }

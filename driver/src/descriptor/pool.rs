@@ -15,7 +15,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 pub(crate) struct DescriptorPool {
     max_sets: usize,
     sizes: HashMap<vk::DescriptorType, u64>,
-    allows_free: bool,
+    flags: vk::DescriptorPoolCreateFlags,
     allocated: Mutex<Allocated>,
 }
 
@@ -42,7 +42,7 @@ impl DescriptorPool {
         Self {
             max_sets: max_sets as usize,
             sizes,
-            allows_free: flags.contains(vk::DescriptorPoolCreateFlags::FREE_DESCRIPTOR_SET),
+            flags,
             allocated: Mutex::default(),
         }
     }
@@ -53,17 +53,32 @@ impl DescriptorPool {
             .unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Makes a set of each layout, or none.
+    /// Makes a set of each layout, with as many descriptors of the binding that leaves their number open as
+    /// `variable_counts` says, or none.
     ///
     /// # Errors
-    /// [`Error::OutOfPoolMemory`].
+    /// [`Error::OutOfPoolMemory`], or [`Error::OutOfDeviceMemory`] for the bytes of inline uniform blocks;
+    /// [`Error::InvalidUsage`] if sets of the layout are updated after bind and those of the pool are not.
     pub(crate) fn allocate(
         &self,
         layouts: Vec<Arc<DescriptorSetLayout>>,
+        variable_counts: &[u32],
     ) -> Result<Vec<vk::DescriptorSet>, Error> {
         let mut allocated = self.lock();
         let mut wanted = allocated.descriptors.clone();
-        layouts.iter().for_each(|layout| add(&mut wanted, layout));
+        let after_bind = vk::DescriptorPoolCreateFlags::UPDATE_AFTER_BIND;
+        for (index, layout) in layouts.iter().enumerate() {
+            if layout.is_updated_after_bind() && !self.flags.contains(after_bind) {
+                return Err(Error::usage(
+                    "VUID-VkDescriptorSetAllocateInfo-pSetLayouts-03044",
+                    "a set that is updated after bind is wanted of a pool of other sets",
+                ));
+            }
+            let variable = variable_counts.get(index).copied().unwrap_or(0);
+            for (kind, count) in layout.kinds(variable) {
+                *wanted.entry(kind).or_default() += count;
+            }
+        }
         let sets = allocated.sets.len() + layouts.len();
         if sets > self.max_sets {
             return Err(Error::OutOfPoolMemory(format!(
@@ -79,10 +94,12 @@ impl DescriptorPool {
                 )));
             }
         }
-        let sets: Vec<_> = layouts
-            .into_iter()
-            .map(|layout| handle::create(Arc::new(DescriptorSet::new(layout))))
-            .collect();
+        let sets = layouts.into_iter().enumerate().map(|(index, layout)| {
+            let variable = variable_counts.get(index).copied().unwrap_or(0);
+            DescriptorSet::new(layout, variable).map(Arc::new)
+        });
+        let sets: Vec<_> = sets.collect::<Result<_, Error>>()?;
+        let sets: Vec<_> = sets.into_iter().map(handle::create).collect();
         allocated.sets.extend(&sets);
         allocated.descriptors = wanted;
         Ok(sets)
@@ -96,7 +113,8 @@ impl DescriptorPool {
     /// # Safety
     /// Nothing uses the handles any more.
     pub(crate) unsafe fn free(&self, sets: &[vk::DescriptorSet]) -> Result<(), Error> {
-        if !self.allows_free {
+        let frees = vk::DescriptorPoolCreateFlags::FREE_DESCRIPTOR_SET;
+        if !self.flags.contains(frees) {
             return Err(Error::usage(
                 "VUID-vkFreeDescriptorSets-descriptorPool-00312",
                 "the pool was made without VK_DESCRIPTOR_POOL_CREATE_FREE_DESCRIPTOR_SET_BIT",
@@ -113,7 +131,10 @@ impl DescriptorPool {
             }
             // SAFETY: the pool made the handle and has not destroyed it, and the caller uses it no more.
             if let Some(set) = unsafe { handle::destroy(set) }? {
-                remove(&mut allocated.descriptors, set.layout());
+                for (kind, count) in set.layout().kinds(set.variable_count()) {
+                    let taken = allocated.descriptors.entry(kind).or_default();
+                    *taken = taken.saturating_sub(count);
+                }
             }
         }
         Ok(())
@@ -136,19 +157,6 @@ impl DescriptorPool {
     }
 }
 
-fn add(counts: &mut HashMap<vk::DescriptorType, u64>, layout: &DescriptorSetLayout) {
-    for binding in layout.bindings() {
-        *counts.entry(binding.kind).or_default() += u64::from(binding.count);
-    }
-}
-
-fn remove(counts: &mut HashMap<vk::DescriptorType, u64>, layout: &DescriptorSetLayout) {
-    for binding in layout.bindings() {
-        let count = counts.entry(binding.kind).or_default();
-        *count = count.saturating_sub(binding.count.into());
-    }
-}
-
 /// # Safety
 /// The create info is valid.
 #[doc(alias = "vkCreateDescriptorPool")]
@@ -156,12 +164,6 @@ pub(crate) unsafe fn create_descriptor_pool(
     create_info: &vk::DescriptorPoolCreateInfo<'_>,
 ) -> Result<Arc<DescriptorPool>, Error> {
     let info = create_info;
-    let update_after_bind = vk::DescriptorPoolCreateFlags::UPDATE_AFTER_BIND;
-    if info.flags.contains(update_after_bind) {
-        return Err(Error::FeatureNotPresent(
-            "a descriptor pool for update after bind".into(),
-        ));
-    }
     // SAFETY: the caller's promise.
     let sizes = unsafe { valid::slice(info.p_pool_sizes, info.pool_size_count)? };
     Ok(Arc::new(DescriptorPool::new(
@@ -204,11 +206,19 @@ pub(crate) unsafe fn allocate_descriptor_sets(
     let info = allocate_info;
     descriptor_sets.fill(MaybeUninit::new(vk::DescriptorSet::null()));
     // SAFETY: the caller's promise.
-    let (pool, layouts) = unsafe {
+    let (pool, layouts, variable_counts) = unsafe {
         let layouts = valid::slice(info.p_set_layouts, info.descriptor_set_count)?;
+        let variable = valid::find_in_chain::<
+            vk::DescriptorSetVariableDescriptorCountAllocateInfo<'_>,
+        >(info.p_next);
+        let counts = match variable {
+            Some(info) => valid::slice(info.p_descriptor_counts, info.descriptor_set_count)?,
+            None => &[],
+        };
         (
             handle::get(info.descriptor_pool)?,
             handle::get_all(layouts)?,
+            counts,
         )
     };
     if layouts.iter().any(|layout| layout.is_push()) {
@@ -217,7 +227,10 @@ pub(crate) unsafe fn allocate_descriptor_sets(
             "a set is allocated whose layout is for pushed descriptors",
         ));
     }
-    for (place, set) in descriptor_sets.iter_mut().zip(pool.allocate(layouts)?) {
+    for (place, set) in descriptor_sets
+        .iter_mut()
+        .zip(pool.allocate(layouts, variable_counts)?)
+    {
         place.write(set);
     }
     Ok(())

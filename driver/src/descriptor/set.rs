@@ -9,8 +9,8 @@ use crate::resource::buffer::{BufferRules, BufferView};
 use crate::resource::image::ImageView;
 use crate::resource::sampler::Sampler;
 use ash::vk;
-use simdevice::host;
 use simdevice::packet::BufferRange;
+use simdevice::{Allocation, host};
 use std::ffi::c_void;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -59,6 +59,7 @@ impl BufferDescriptor {
 #[derive(Debug)]
 pub(crate) struct DescriptorSet {
     layout: Arc<DescriptorSetLayout>,
+    variable_count: u32,
     descriptors: Mutex<Vec<Descriptor>>,
 }
 
@@ -73,6 +74,8 @@ pub(crate) struct Write {
     pub(crate) kind: vk::DescriptorType,
     /// The new descriptors.
     pub(crate) descriptors: Vec<Descriptor>,
+    /// The new bytes of an inline uniform block, from byte `element` on; empty for all other kinds.
+    pub(crate) bytes: Vec<u8>,
 }
 
 objects! {
@@ -81,10 +84,27 @@ objects! {
 }
 
 impl DescriptorSet {
-    /// A set that holds nothing but immutable samplers.
-    pub(crate) fn new(layout: Arc<DescriptorSetLayout>) -> Self {
+    /// A set that holds nothing but immutable samplers and inline uniform blocks of zeros. It has `variable_count`
+    /// descriptors, or bytes, of the binding that leaves their number open.
+    ///
+    /// # Errors
+    /// [`Error::OutOfDeviceMemory`] if there is no memory for inline uniform blocks.
+    pub(crate) fn new(
+        layout: Arc<DescriptorSetLayout>,
+        variable_count: u32,
+    ) -> Result<Self, Error> {
         let mut descriptors = host::with_capacity(layout.count());
+        let variable = layout.variable_binding().map(|binding| binding.first);
         for binding in layout.bindings() {
+            let is_variable = variable == Some(binding.first);
+            if binding.inline_bytes > 0 {
+                let bytes = match is_variable {
+                    true => variable_count.min(binding.inline_bytes),
+                    false => binding.inline_bytes,
+                };
+                descriptors.push(inline_block(bytes)?);
+                continue;
+            }
             let samplers = binding
                 .immutable_samplers
                 .iter()
@@ -93,12 +113,22 @@ impl DescriptorSet {
                     sampler: Some(Arc::clone(sampler)),
                 });
             descriptors.extend(samplers);
-            descriptors.resize(binding.first + binding.count as usize, Descriptor::Empty);
+            let count = match is_variable {
+                true => variable_count.min(binding.count),
+                false => binding.count,
+            };
+            descriptors.resize(binding.first + count as usize, Descriptor::Empty);
         }
-        Self {
+        Ok(Self {
             layout,
+            variable_count,
             descriptors: Mutex::new(descriptors),
-        }
+        })
+    }
+
+    /// The number of descriptors, or of bytes, of the binding that leaves their number open.
+    pub(crate) fn variable_count(&self) -> u32 {
+        self.variable_count
     }
 
     /// Its layout.
@@ -118,9 +148,18 @@ impl DescriptorSet {
     /// # Errors
     /// [`Error::InvalidUsage`], and nothing is replaced, if the set does not have them, or has others.
     pub(crate) fn write(&self, write: &Write) -> Result<(), Error> {
+        if write.kind == vk::DescriptorType::INLINE_UNIFORM_BLOCK {
+            let block = self.inline_block(write.binding)?;
+            return in_block(
+                &block,
+                write.element,
+                write.bytes.len(),
+                |memory, offset| memory.write(offset, &write.bytes),
+            );
+        }
         let first = self.layout.index(write.binding, write.element)?;
         let end = first + write.descriptors.len();
-        if end > self.layout.count() {
+        if end > self.lock().len() {
             return Err(Error::usage(
                 "VUID-VkWriteDescriptorSet-dstArrayElement-00321",
                 format!(
@@ -161,6 +200,21 @@ impl DescriptorSet {
         count: u32,
     ) -> Result<(), Error> {
         let kind = source.layout.binding(source_binding).map(|b| b.kind);
+        if kind == Some(vk::DescriptorType::INLINE_UNIFORM_BLOCK) {
+            let mut bytes = host::with_capacity(count as usize);
+            bytes.resize(count as usize, 0u8);
+            let block = source.inline_block(source_binding)?;
+            in_block(&block, source_element, bytes.len(), |memory, offset| {
+                memory.read(offset, &mut bytes)
+            })?;
+            return self.write(&Write {
+                binding,
+                element,
+                kind: kind.unwrap_or_default(),
+                descriptors: Vec::new(),
+                bytes,
+            });
+        }
         let start = source.layout.index(source_binding, source_element)?;
         let found = source
             .lock()
@@ -180,7 +234,24 @@ impl DescriptorSet {
             element,
             kind: kind.unwrap_or_default(),
             descriptors,
+            bytes: Vec::new(),
         })
+    }
+
+    /// The bytes of the inline uniform block that a binding is.
+    ///
+    /// # Errors
+    /// [`Error::InvalidUsage`] if the binding is none.
+    fn inline_block(&self, binding: u32) -> Result<BufferRange, Error> {
+        let found = self.layout.binding(binding);
+        let block = found.filter(|binding| binding.inline_bytes > 0);
+        match block.and_then(|binding| self.lock().get(binding.first).cloned()) {
+            Some(Descriptor::Buffer(block)) => Ok(block.rest),
+            _ => Err(Error::usage(
+                "VUID-VkWriteDescriptorSet-descriptorType-00319",
+                format!("binding {binding} is no inline uniform block"),
+            )),
+        }
     }
 
     /// The bindings that descriptors `first..end` belong to.
@@ -190,6 +261,45 @@ impl DescriptorSet {
         };
         self.layout.bindings().filter(overlaps).collect()
     }
+}
+
+/// The descriptor of an inline uniform block of so many bytes, in memory of its own.
+fn inline_block(bytes: u32) -> Result<Descriptor, Error> {
+    let size = u64::from(bytes);
+    let memory = Allocation::new_zeroed(size.max(1))
+        .map_err(|error| Error::OutOfDeviceMemory(error.to_string()))?;
+    Ok(Descriptor::Buffer(BufferDescriptor {
+        rest: BufferRange {
+            memory,
+            offset: 0,
+            size,
+        },
+        size: None,
+    }))
+}
+
+/// Reads or writes `count` bytes of an inline uniform block from byte `start` on.
+///
+/// # Errors
+/// [`Error::InvalidUsage`] if the block does not have them.
+fn in_block<E>(
+    block: &BufferRange,
+    start: u32,
+    count: usize,
+    access: impl FnOnce(&Allocation, u64) -> Result<(), E>,
+) -> Result<(), Error> {
+    let start = u64::from(start);
+    let fits = start + count as u64 <= block.size;
+    if fits && access(&block.memory, block.offset + start).is_ok() {
+        return Ok(());
+    }
+    Err(Error::usage(
+        "VUID-VkWriteDescriptorSet-dstArrayElement-00321",
+        format!(
+            "{count} bytes from byte {start} on of an inline uniform block of {}",
+            block.size
+        ),
+    ))
 }
 
 /// Replaces a descriptor; an immutable sampler stays.
@@ -229,6 +339,24 @@ pub(crate) unsafe fn write(
     layout: &DescriptorSetLayout,
 ) -> Result<Write, Error> {
     let kind = info.descriptor_type;
+    if kind == vk::DescriptorType::INLINE_UNIFORM_BLOCK {
+        // SAFETY: the caller's promise.
+        let bytes = unsafe {
+            let block =
+                valid::find_in_chain::<vk::WriteDescriptorSetInlineUniformBlock<'_>>(info.p_next)
+                    .ok_or(Error::NullPointer {
+                    what: "the bytes of an inline uniform block",
+                })?;
+            valid::slice(block.p_data.cast::<u8>(), block.data_size)?
+        };
+        return Ok(Write {
+            binding: info.dst_binding,
+            element: info.dst_array_element,
+            kind,
+            descriptors: Vec::new(),
+            bytes: host::copied(bytes),
+        });
+    }
     let contents = DescriptorSource::of(kind, layout, info.dst_binding)?;
     let (data, stride) = match contents {
         DescriptorSource::Image { .. } => (
@@ -250,6 +378,7 @@ pub(crate) unsafe fn write(
         element: info.dst_array_element,
         kind,
         descriptors,
+        bytes: Vec::new(),
     })
 }
 
@@ -268,6 +397,20 @@ pub(crate) unsafe fn template_writes(
         });
     }
     let write = |entry: &vk::DescriptorUpdateTemplateEntry| {
+        if entry.descriptor_type == vk::DescriptorType::INLINE_UNIFORM_BLOCK {
+            // SAFETY: the caller's promise: the entry's offset leads to so many bytes.
+            let bytes = unsafe {
+                let start = data.byte_add(entry.offset).cast::<u8>();
+                valid::slice(start, entry.descriptor_count)?
+            };
+            return Ok(Write {
+                binding: entry.dst_binding,
+                element: entry.dst_array_element,
+                kind: entry.descriptor_type,
+                descriptors: Vec::new(),
+                bytes: host::copied(bytes),
+            });
+        }
         let contents = DescriptorSource::of(entry.descriptor_type, layout, entry.dst_binding)?;
         // SAFETY: the caller's promise: the entry's offset and stride lead to valid contents.
         let descriptors = unsafe {
@@ -283,6 +426,7 @@ pub(crate) unsafe fn template_writes(
             element: entry.dst_array_element,
             kind: entry.descriptor_type,
             descriptors,
+            bytes: Vec::new(),
         })
     };
     let mut writes = host::with_capacity(template.entries.len());
@@ -501,7 +645,6 @@ pub(crate) unsafe fn update_descriptor_set_with_template(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use simdevice::Allocation;
 
     #[test]
     fn dynamic_offsets_stay_inside_the_buffer() {

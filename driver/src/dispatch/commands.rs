@@ -312,6 +312,11 @@ static ROWS: &[Command] = rows! {
         vkBindBufferMemory2KHR: vk::PFN_vkBindBufferMemory2 = vkBindBufferMemory2;
         vkBindImageMemory2KHR: vk::PFN_vkBindImageMemory2 = vkBindImageMemory2;
     }
+    Device, DeviceExtension(&[c"VK_KHR_buffer_device_address"]) => {
+        vkGetBufferDeviceAddressKHR: vk::PFN_vkGetBufferDeviceAddress = vkGetBufferDeviceAddress;
+        vkGetBufferOpaqueCaptureAddressKHR: vk::PFN_vkGetBufferOpaqueCaptureAddress = vkGetBufferOpaqueCaptureAddress;
+        vkGetDeviceMemoryOpaqueCaptureAddressKHR: vk::PFN_vkGetDeviceMemoryOpaqueCaptureAddress = vkGetDeviceMemoryOpaqueCaptureAddress;
+    }
     Device, DeviceExtension(&[c"VK_KHR_copy_commands2"]) => {
         vkCmdCopyBuffer2KHR: vk::PFN_vkCmdCopyBuffer2 = vkCmdCopyBuffer2;
         vkCmdCopyImage2KHR: vk::PFN_vkCmdCopyImage2 = vkCmdCopyImage2;
@@ -1188,9 +1193,10 @@ unsafe extern "system" fn vkCreateBuffer(
         unsafe {
             valid::output(
                 p_buffer,
-                handle::create(crate::resource::buffer::create_buffer(valid::input(
-                    p_create_info,
-                )?)?),
+                handle::create(crate::resource::buffer::create_buffer(
+                    handle::get(device)?,
+                    valid::input(p_create_info)?,
+                )?),
             )
             .map(|()| vk::Result::SUCCESS)
         }
@@ -1939,7 +1945,6 @@ unsafe extern "system" fn vkCreateComputePipelines(
                 valid::slice(p_create_infos, create_info_count)?,
                 valid::output_slice(p_pipelines, create_info_count as usize)?,
             )
-            .map(|()| vk::Result::SUCCESS)
         }
     })
 }
@@ -2352,7 +2357,6 @@ unsafe extern "system" fn vkCreateGraphicsPipelines(
                 valid::slice(p_create_infos, create_info_count)?,
                 valid::output_slice(p_pipelines, create_info_count as usize)?,
             )
-            .map(|()| vk::Result::SUCCESS)
         }
     })
 }
@@ -2631,7 +2635,7 @@ unsafe extern "system" fn vkCmdBindVertexBuffers(
                 crate::command::bind::cmd_bind_vertex_buffers(
                     recorder,
                     first_binding,
-                    &handle::get_all(valid::slice(p_buffers, binding_count)?)?,
+                    valid::slice(p_buffers, binding_count)?,
                     valid::slice(p_offsets, binding_count)?,
                 )
             })
@@ -3137,9 +3141,9 @@ unsafe extern "system" fn vkGetPhysicalDeviceMemoryProperties2(
         || {
             // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
             unsafe {
-                crate::physical_device::get_physical_device_memory_properties2(
-                    valid::output_structure(p_memory_properties)?,
-                )
+                crate::physical_device::get_physical_device_memory_properties2(OutputChain::new(
+                    p_memory_properties,
+                )?)
             }
         },
     )
@@ -3429,23 +3433,21 @@ unsafe extern "system" fn vkSignalSemaphore(
 
 unsafe extern "system" fn vkGetBufferDeviceAddress(
     device: vk::Device,
-    _: *const vk::BufferDeviceAddressInfo<'_>,
+    p_info: *const vk::BufferDeviceAddressInfo<'_>,
 ) -> vk::DeviceAddress {
     guard(device, "vkGetBufferDeviceAddress", || {
-        Err::<vk::DeviceAddress, _>(Error::Unsupported {
-            command: "vkGetBufferDeviceAddress".to_owned(),
-        })
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe { crate::resource::buffer::get_buffer_device_address(valid::input(p_info)?) }
     })
 }
 
 unsafe extern "system" fn vkGetBufferOpaqueCaptureAddress(
     device: vk::Device,
-    _: *const vk::BufferDeviceAddressInfo<'_>,
+    p_info: *const vk::BufferDeviceAddressInfo<'_>,
 ) -> u64 {
     guard(device, "vkGetBufferOpaqueCaptureAddress", || {
-        Err::<u64, _>(Error::Unsupported {
-            command: "vkGetBufferOpaqueCaptureAddress".to_owned(),
-        })
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe { crate::resource::buffer::get_buffer_opaque_capture_address(valid::input(p_info)?) }
     })
 }
 
@@ -3454,9 +3456,7 @@ unsafe extern "system" fn vkGetDeviceMemoryOpaqueCaptureAddress(
     _: *const vk::DeviceMemoryOpaqueCaptureAddressInfo<'_>,
 ) -> u64 {
     guard(device, "vkGetDeviceMemoryOpaqueCaptureAddress", || {
-        Err::<u64, _>(Error::Unsupported {
-            command: "vkGetDeviceMemoryOpaqueCaptureAddress".to_owned(),
-        })
+        crate::resource::memory::get_device_memory_opaque_capture_address()
     })
 }
 
@@ -4051,7 +4051,7 @@ unsafe extern "system" fn vkCmdBindVertexBuffers2(
                 crate::command::bind::cmd_bind_vertex_buffers2(
                     recorder,
                     first_binding,
-                    &handle::get_all(valid::slice(p_buffers, binding_count)?)?,
+                    valid::slice(p_buffers, binding_count)?,
                     valid::slice(p_offsets, binding_count)?,
                     (!p_sizes.is_null())
                         .then(|| valid::slice(p_sizes, binding_count))

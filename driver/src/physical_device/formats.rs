@@ -20,7 +20,11 @@ pub(crate) fn device_format(format: vk::Format) -> Option<Format> {
             .map(|raw| named(&format!("{:?}", vk::Format::from_raw(raw))))
             .collect()
     });
-    *FORMATS.get(usize::try_from(format.as_raw()).ok()?)?
+    match format {
+        vk::Format::A4R4G4B4_UNORM_PACK16 => Some(Format::A4R4G4B4UnormPack16),
+        vk::Format::A4B4G4R4_UNORM_PACK16 => Some(Format::A4B4G4R4UnormPack16),
+        _ => *FORMATS.get(usize::try_from(format.as_raw()).ok()?)?,
+    }
 }
 
 /// The device's format that has Vulkan's name in camel case.
@@ -46,6 +50,12 @@ fn is_compressed(format: Format) -> bool {
     format.decompressed().is_some()
 }
 
+/// The features of formats whose texels can be mixed, or compared with each other.
+const FILTERED: vk::FormatFeatureFlags = vk::FormatFeatureFlags::from_raw(
+    vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR.as_raw()
+        | vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_MINMAX.as_raw(),
+);
+
 /// The features of images of the format, of either tiling.
 fn image_features(format: Format) -> vk::FormatFeatureFlags {
     if is_scaled(format) {
@@ -56,7 +66,7 @@ fn image_features(format: Format) -> vk::FormatFeatureFlags {
             | vk::FormatFeatureFlags::TRANSFER_DST
             | vk::FormatFeatureFlags::BLIT_SRC
             | vk::FormatFeatureFlags::SAMPLED_IMAGE
-            | vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR;
+            | FILTERED;
     }
     let mut features = vk::FormatFeatureFlags::TRANSFER_SRC
         | vk::FormatFeatureFlags::TRANSFER_DST
@@ -64,7 +74,7 @@ fn image_features(format: Format) -> vk::FormatFeatureFlags {
         | vk::FormatFeatureFlags::BLIT_DST
         | vk::FormatFeatureFlags::SAMPLED_IMAGE;
     if !format.is_integer() && format.aspects() != [Aspect::Stencil] {
-        features |= vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR;
+        features |= FILTERED;
     }
     if !is_color(format) {
         return features | vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT;
@@ -207,7 +217,16 @@ const USAGES: &[(vk::ImageUsageFlags, vk::FormatFeatureFlags)] = &[
     ),
 ];
 
+/// The features of which an input attachment's format must have one: shaders read nothing that is not rendered to.
+const ATTACHMENT: vk::FormatFeatureFlags = vk::FormatFeatureFlags::from_raw(
+    vk::FormatFeatureFlags::COLOR_ATTACHMENT.as_raw()
+        | vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT.as_raw(),
+);
+
 fn supports_usage(features: vk::FormatFeatureFlags, usage: vk::ImageUsageFlags) -> bool {
+    if usage.contains(vk::ImageUsageFlags::INPUT_ATTACHMENT) && !features.intersects(ATTACHMENT) {
+        return false;
+    }
     let supported = USAGES
         .iter()
         .filter(|(_, needed)| features.contains(*needed))
@@ -284,9 +303,7 @@ pub(crate) fn image_properties(query: ImageQuery) -> Result<vk::ImageFormatPrope
         }
     };
     let is_linear = tiling == vk::ImageTiling::LINEAR;
-    let is_attachment = features.intersects(
-        vk::FormatFeatureFlags::COLOR_ATTACHMENT | vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT,
-    );
+    let is_attachment = features.intersects(ATTACHMENT);
     let has_samples = is_attachment
         && !is_linear
         && ty == vk::ImageType::TYPE_2D

@@ -42,7 +42,7 @@ const PROCESSING_ELEMENTS: u32 = 16;
 pub(crate) const MAX_IMAGE_DIMENSION: u32 = 16384;
 
 /// The greatest extent of an image in three dimensions.
-pub(crate) const MAX_IMAGE_DIMENSION_3D: u32 = 2048;
+pub(crate) const MAX_IMAGE_DIMENSION_3D: u32 = 4096;
 
 /// The most array layers of an image or framebuffer.
 pub(crate) const MAX_LAYERS: u32 = 2048;
@@ -64,6 +64,9 @@ pub(crate) const MAX_COLOR_ATTACHMENTS: u32 = 8;
 /// The greatest magnitude of a sampler's bias of the level of detail.
 pub(crate) const MAX_SAMPLER_LOD_BIAS: f32 = simdevice::limits::MAX_LOD_BIAS;
 
+/// The most samples along a pixel's footprint.
+pub(crate) const MAX_SAMPLER_ANISOTROPY: f32 = 16.0;
+
 /// The bytes of push constants.
 pub(crate) const MAX_PUSH_CONSTANTS_SIZE: u32 = 256;
 
@@ -74,13 +77,32 @@ pub(crate) const MAX_PUSH_DESCRIPTORS: u32 = 32;
 pub(crate) const MAX_PER_SET_DESCRIPTORS: u32 = DESCRIPTORS;
 
 /// The most descriptors of a kind that a stage, or a set, may have. Nothing but memory bounds them.
-const DESCRIPTORS: u32 = 1 << 16;
+const DESCRIPTORS: u32 = 1 << 20;
+
+/// The most bytes of an inline uniform block.
+pub(crate) const MAX_INLINE_UNIFORM_BLOCK_SIZE: u32 = 4096;
+
+/// The most inline uniform blocks of a stage, or of a set. Nothing but memory bounds them.
+const INLINE_UNIFORM_BLOCKS: u32 = 64;
 
 /// The most descriptors with dynamic offsets.
 const DYNAMIC_DESCRIPTORS: u32 = 64;
 
 /// Offsets of uniform, storage and texel buffers must be multiples of this.
 pub(crate) const MIN_BUFFER_OFFSET_ALIGNMENT: u64 = 16;
+
+/// The most texels of a texel buffer.
+pub(crate) const MAX_TEXEL_BUFFER_ELEMENTS: u32 = 1 << 27;
+
+/// The most scalars that a vertex shader hands to a fragment shader: 32 vectors of four.
+const MAX_VARYING_COMPONENTS: u32 = 128;
+
+/// The offsets in texels that an instruction may give.
+const TEXEL_OFFSETS: std::ops::RangeInclusive<i32> = -32..=31;
+
+/// The most workgroups of a dispatch in x, y and z. The device takes any number; programs that read the limit as signed take
+/// a greater one for -1.
+const MAX_WORKGROUP_COUNT: u32 = 65535;
 
 /// The most invocations of a workgroup in x, y and z.
 pub(crate) const MAX_WORKGROUP_SIZE: [u32; 3] = [MAX_WORKGROUP_INVOCATIONS; 3];
@@ -138,7 +160,7 @@ fn find_properties() -> Properties {
         max_image_dimension3_d: MAX_IMAGE_DIMENSION_3D,
         max_image_dimension_cube: MAX_IMAGE_DIMENSION,
         max_image_array_layers: MAX_LAYERS,
-        max_texel_buffer_elements: 1 << 16,
+        max_texel_buffer_elements: MAX_TEXEL_BUFFER_ELEMENTS,
         max_uniform_buffer_range: 1 << 16,
         max_storage_buffer_range: u32::MAX,
         max_push_constants_size: MAX_PUSH_CONSTANTS_SIZE,
@@ -166,7 +188,7 @@ fn find_properties() -> Properties {
         max_vertex_input_bindings: MAX_VERTEX_INPUTS,
         max_vertex_input_attribute_offset: 65535,
         max_vertex_input_binding_stride: 65536,
-        max_vertex_output_components: 64,
+        max_vertex_output_components: MAX_VARYING_COMPONENTS,
         max_tessellation_generation_level: 0,
         max_tessellation_patch_size: 0,
         max_tessellation_control_per_vertex_input_components: 0,
@@ -180,12 +202,12 @@ fn find_properties() -> Properties {
         max_geometry_output_components: 0,
         max_geometry_output_vertices: 0,
         max_geometry_total_output_components: 0,
-        max_fragment_input_components: 64,
+        max_fragment_input_components: MAX_VARYING_COMPONENTS,
         max_fragment_output_attachments: MAX_COLOR_ATTACHMENTS,
         max_fragment_dual_src_attachments: 1,
         max_fragment_combined_output_resources: DESCRIPTORS,
         max_compute_shared_memory_size: MAX_SHARED_BYTES,
-        max_compute_work_group_count: [u32::MAX; 3],
+        max_compute_work_group_count: [MAX_WORKGROUP_COUNT; 3],
         max_compute_work_group_invocations: MAX_WORKGROUP_INVOCATIONS,
         max_compute_work_group_size: MAX_WORKGROUP_SIZE,
         sub_pixel_precision_bits: 8,
@@ -194,7 +216,7 @@ fn find_properties() -> Properties {
         max_draw_indexed_index_value: u32::MAX,
         max_draw_indirect_count: u32::MAX,
         max_sampler_lod_bias: MAX_SAMPLER_LOD_BIAS,
-        max_sampler_anisotropy: 1.0,
+        max_sampler_anisotropy: MAX_SAMPLER_ANISOTROPY,
         max_viewports: simdevice::limits::MAX_VIEWPORTS as u32,
         max_viewport_dimensions: [MAX_IMAGE_DIMENSION; 2],
         viewport_bounds_range: [
@@ -206,10 +228,10 @@ fn find_properties() -> Properties {
         min_texel_buffer_offset_alignment: MIN_BUFFER_OFFSET_ALIGNMENT,
         min_uniform_buffer_offset_alignment: MIN_BUFFER_OFFSET_ALIGNMENT,
         min_storage_buffer_offset_alignment: MIN_BUFFER_OFFSET_ALIGNMENT,
-        min_texel_offset: -8,
-        max_texel_offset: 7,
-        min_texel_gather_offset: -8,
-        max_texel_gather_offset: 7,
+        min_texel_offset: *TEXEL_OFFSETS.start(),
+        max_texel_offset: *TEXEL_OFFSETS.end() as u32,
+        min_texel_gather_offset: *TEXEL_OFFSETS.start(),
+        max_texel_gather_offset: *TEXEL_OFFSETS.end() as u32,
         min_interpolation_offset: -0.5,
         // The greatest offset is less than half a pixel by one step of its precision.
         max_interpolation_offset: 0.5 - 1.0 / 16.0,
@@ -269,8 +291,8 @@ fn find_properties() -> Properties {
             | vk::SubgroupFeatureFlags::QUAD,
         subgroup_quad_operations_in_all_stages: true,
         point_clipping_behavior: vk::PointClippingBehavior::ALL_CLIP_PLANES,
-        max_multiview_view_count: 0,
-        max_multiview_instance_index: 0,
+        max_multiview_view_count: u32::BITS,
+        max_multiview_instance_index: u32::MAX >> 1,
         protected_no_fault: false,
         max_per_set_descriptors: MAX_PER_SET_DESCRIPTORS,
         max_memory_allocation_size: memory::heap_size(),
@@ -296,30 +318,30 @@ fn find_properties() -> Properties {
         shader_rounding_mode_rtz_float16: false,
         shader_rounding_mode_rtz_float32: false,
         shader_rounding_mode_rtz_float64: false,
-        // No descriptor is updated after its set was bound.
-        max_update_after_bind_descriptors_in_all_pools: 0,
+        // Sets are read when commands execute, so that it makes no difference when they were updated.
+        max_update_after_bind_descriptors_in_all_pools: u32::MAX,
         shader_uniform_buffer_array_non_uniform_indexing_native: true,
         shader_sampled_image_array_non_uniform_indexing_native: true,
         shader_storage_buffer_array_non_uniform_indexing_native: true,
         shader_storage_image_array_non_uniform_indexing_native: true,
         shader_input_attachment_array_non_uniform_indexing_native: false,
-        robust_buffer_access_update_after_bind: false,
+        robust_buffer_access_update_after_bind: true,
         quad_divergent_implicit_lod: false,
-        max_per_stage_descriptor_update_after_bind_samplers: 0,
-        max_per_stage_descriptor_update_after_bind_uniform_buffers: 0,
-        max_per_stage_descriptor_update_after_bind_storage_buffers: 0,
-        max_per_stage_descriptor_update_after_bind_sampled_images: 0,
-        max_per_stage_descriptor_update_after_bind_storage_images: 0,
-        max_per_stage_descriptor_update_after_bind_input_attachments: 0,
-        max_per_stage_update_after_bind_resources: 0,
-        max_descriptor_set_update_after_bind_samplers: 0,
-        max_descriptor_set_update_after_bind_uniform_buffers: 0,
-        max_descriptor_set_update_after_bind_uniform_buffers_dynamic: 0,
-        max_descriptor_set_update_after_bind_storage_buffers: 0,
-        max_descriptor_set_update_after_bind_storage_buffers_dynamic: 0,
-        max_descriptor_set_update_after_bind_sampled_images: 0,
-        max_descriptor_set_update_after_bind_storage_images: 0,
-        max_descriptor_set_update_after_bind_input_attachments: 0,
+        max_per_stage_descriptor_update_after_bind_samplers: DESCRIPTORS,
+        max_per_stage_descriptor_update_after_bind_uniform_buffers: DESCRIPTORS,
+        max_per_stage_descriptor_update_after_bind_storage_buffers: DESCRIPTORS,
+        max_per_stage_descriptor_update_after_bind_sampled_images: DESCRIPTORS,
+        max_per_stage_descriptor_update_after_bind_storage_images: DESCRIPTORS,
+        max_per_stage_descriptor_update_after_bind_input_attachments: DESCRIPTORS,
+        max_per_stage_update_after_bind_resources: DESCRIPTORS,
+        max_descriptor_set_update_after_bind_samplers: DESCRIPTORS,
+        max_descriptor_set_update_after_bind_uniform_buffers: DESCRIPTORS,
+        max_descriptor_set_update_after_bind_uniform_buffers_dynamic: DYNAMIC_DESCRIPTORS,
+        max_descriptor_set_update_after_bind_storage_buffers: DESCRIPTORS,
+        max_descriptor_set_update_after_bind_storage_buffers_dynamic: DYNAMIC_DESCRIPTORS,
+        max_descriptor_set_update_after_bind_sampled_images: DESCRIPTORS,
+        max_descriptor_set_update_after_bind_storage_images: DESCRIPTORS,
+        max_descriptor_set_update_after_bind_input_attachments: DESCRIPTORS,
         supported_depth_resolve_modes: vk::ResolveModeFlags::SAMPLE_ZERO
             | vk::ResolveModeFlags::AVERAGE
             | vk::ResolveModeFlags::MIN
@@ -329,20 +351,24 @@ fn find_properties() -> Properties {
             | vk::ResolveModeFlags::MAX,
         independent_resolve_none: true,
         independent_resolve: true,
-        filter_minmax_single_component_formats: false,
-        filter_minmax_image_component_mapping: false,
+        filter_minmax_single_component_formats: true,
+        filter_minmax_image_component_mapping: true,
         max_timeline_semaphore_value_difference: u64::MAX,
+        max_custom_border_color_samplers: 1 << 16,
+        // Every access is held against the range itself, scalar by scalar.
+        robust_storage_buffer_access_size_alignment: 1,
+        robust_uniform_buffer_access_size_alignment: 1,
         framebuffer_integer_color_sample_counts: SAMPLE_COUNTS,
         min_subgroup_size: *SUBGROUP_SIZES.start(),
         max_subgroup_size: *SUBGROUP_SIZES.end(),
         max_compute_workgroup_subgroups: MAX_WORKGROUP_INVOCATIONS / *SUBGROUP_SIZES.start(),
         required_subgroup_size_stages: vk::ShaderStageFlags::COMPUTE,
-        max_inline_uniform_block_size: 0,
-        max_per_stage_descriptor_inline_uniform_blocks: 0,
-        max_per_stage_descriptor_update_after_bind_inline_uniform_blocks: 0,
-        max_descriptor_set_inline_uniform_blocks: 0,
-        max_descriptor_set_update_after_bind_inline_uniform_blocks: 0,
-        max_inline_uniform_total_size: 0,
+        max_inline_uniform_block_size: MAX_INLINE_UNIFORM_BLOCK_SIZE,
+        max_per_stage_descriptor_inline_uniform_blocks: INLINE_UNIFORM_BLOCKS,
+        max_per_stage_descriptor_update_after_bind_inline_uniform_blocks: INLINE_UNIFORM_BLOCKS,
+        max_descriptor_set_inline_uniform_blocks: INLINE_UNIFORM_BLOCKS,
+        max_descriptor_set_update_after_bind_inline_uniform_blocks: INLINE_UNIFORM_BLOCKS,
+        max_inline_uniform_total_size: MAX_INLINE_UNIFORM_BLOCK_SIZE * INLINE_UNIFORM_BLOCKS,
         // No instruction is a dot product of integers.
         integer_dot_product8_bit_unsigned_accelerated: false,
         integer_dot_product8_bit_signed_accelerated: false,

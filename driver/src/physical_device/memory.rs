@@ -45,11 +45,14 @@ fn host_memory() -> Option<u64> {
     total_memory(&text)
 }
 
-/// The bytes of `MemTotal`, which `/proc/meminfo` gives in KiB.
+/// The bytes of `MemTotal`.
 fn total_memory(meminfo: &str) -> Option<u64> {
-    let line = meminfo
-        .lines()
-        .find_map(|line| line.strip_prefix("MemTotal:"))?;
+    kibibytes(meminfo, "MemTotal:")
+}
+
+/// The bytes of a row of `/proc/meminfo`, which gives them in KiB.
+fn kibibytes(meminfo: &str, name: &str) -> Option<u64> {
+    let line = meminfo.lines().find_map(|line| line.strip_prefix(name))?;
     let kibibytes: u64 = line.split_whitespace().next()?.parse().ok()?;
     kibibytes.checked_mul(1024)
 }
@@ -72,6 +75,22 @@ pub(crate) fn properties() -> vk::PhysicalDeviceMemoryProperties {
         flags: vk::MemoryHeapFlags::DEVICE_LOCAL,
     };
     properties
+}
+
+/// The bytes that all devices of the process have taken.
+static TAKEN: AtomicU64 = AtomicU64::new(0);
+
+/// The bytes of each heap that the process may have, and those that it has.
+pub(crate) fn write_budget(out: &mut vk::PhysicalDeviceMemoryBudgetPropertiesEXT<'_>) {
+    out.heap_budget = [0; vk::MAX_MEMORY_HEAPS];
+    out.heap_usage = [0; vk::MAX_MEMORY_HEAPS];
+    out.heap_usage[0] = TAKEN.load(Ordering::Acquire);
+    let free = std::fs::read_to_string("/proc/meminfo")
+        .ok()
+        .and_then(|text| kibibytes(&text, "MemAvailable:"));
+    // What other processes use isn't to be had.
+    let available = free.map_or(u64::MAX, |free| free.saturating_add(out.heap_usage[0]));
+    out.heap_budget[0] = available.min(heap_size());
 }
 
 /// The accounting of a memory heap.
@@ -98,7 +117,9 @@ impl Heap {
         let within_budget = |used: u64| used.checked_add(size).filter(|&used| used <= self.size);
         self.used
             .fetch_update(Ordering::AcqRel, Ordering::Acquire, within_budget)
-            .map(drop)
+            .map(|_| {
+                TAKEN.fetch_add(size, Ordering::AcqRel);
+            })
             .map_err(|used| {
                 Error::OutOfDeviceMemory(format!(
                     "{size} bytes asked for, and {used} of the heap's {} are taken",
@@ -110,6 +131,7 @@ impl Heap {
     /// Gives back what was taken.
     pub(crate) fn give_back(&self, size: u64) {
         self.used.fetch_sub(size, Ordering::AcqRel);
+        TAKEN.fetch_sub(size, Ordering::AcqRel);
     }
 }
 

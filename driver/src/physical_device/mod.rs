@@ -14,16 +14,27 @@ use crate::registry::{self, features::SUPPORTED};
 use ash::vk;
 use std::ffi::CStr;
 
-/// The index of the queue family: there is one, with one queue that does everything.
+/// The index of the queue family that does everything.
 pub(crate) const QUEUE_FAMILY: u32 = 0;
 
-/// The number of queues that it has.
+/// What the queues of each family do: everything, all but draws, and copies.
+pub(crate) const QUEUE_FAMILIES: [vk::QueueFlags; 3] = [
+    vk::QueueFlags::from_raw(
+        vk::QueueFlags::GRAPHICS.as_raw()
+            | vk::QueueFlags::COMPUTE.as_raw()
+            | vk::QueueFlags::TRANSFER.as_raw(),
+    ),
+    vk::QueueFlags::from_raw(vk::QueueFlags::COMPUTE.as_raw() | vk::QueueFlags::TRANSFER.as_raw()),
+    vk::QueueFlags::TRANSFER,
+];
+
+/// The number of queues that each family has.
 pub(crate) const QUEUE_COUNT: u32 = 1;
 
-/// `VkQueueFamilyProperties` of the family. Timestamps are the host's nanoseconds in 64 bits.
-fn queue_family_properties() -> vk::QueueFamilyProperties {
+/// `VkQueueFamilyProperties` of a family. Timestamps are the host's nanoseconds in 64 bits.
+fn queue_family_properties(queue_flags: vk::QueueFlags) -> vk::QueueFamilyProperties {
     vk::QueueFamilyProperties {
-        queue_flags: vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE | vk::QueueFlags::TRANSFER,
+        queue_flags,
         queue_count: QUEUE_COUNT,
         timestamp_valid_bits: 64,
         min_image_transfer_granularity: vk::Extent3D {
@@ -146,11 +157,13 @@ pub(crate) unsafe fn get_physical_device_image_format_properties2(
             out.external_memory_properties = vk::ExternalMemoryProperties::default();
         }
     });
+    // SAFETY: the caller's promise.
+    let stencil = unsafe { valid::find_in_chain::<vk::ImageStencilUsageCreateInfo>(info.p_next) };
     let query = ImageQuery {
         format: info.format,
         ty: info.ty,
         tiling: info.tiling,
-        usage: info.usage,
+        usage: info.usage | stencil.map_or_else(Default::default, |it| it.stencil_usage),
         flags: info.flags,
     };
     image_format_answer(query, &mut image_format_properties.image_format_properties)
@@ -171,18 +184,20 @@ pub(crate) fn get_physical_device_sparse_image_format_properties2(
 
 #[doc(alias = "vkGetPhysicalDeviceQueueFamilyProperties")]
 pub(crate) fn get_physical_device_queue_family_properties()
--> Result<[vk::QueueFamilyProperties; 1], Error> {
-    Ok([queue_family_properties()])
+-> Result<[vk::QueueFamilyProperties; QUEUE_FAMILIES.len()], Error> {
+    Ok(QUEUE_FAMILIES.map(queue_family_properties))
 }
 
 #[doc(alias = "vkGetPhysicalDeviceQueueFamilyProperties2")]
 pub(crate) fn get_physical_device_queue_family_properties2(
     queue_family_properties: Structures<'_, vk::QueueFamilyProperties2<'_>>,
 ) -> Result<(), Error> {
-    let fill = |_, family: &mut vk::QueueFamilyProperties2<'_>| {
-        family.queue_family_properties = self::queue_family_properties();
+    let fill = |index: usize, family: &mut vk::QueueFamilyProperties2<'_>| {
+        let flags = QUEUE_FAMILIES.get(index).copied().unwrap_or_default();
+        family.queue_family_properties = self::queue_family_properties(flags);
     };
-    queue_family_properties.fill(1, fill).map(drop)
+    let count = QUEUE_FAMILIES.len();
+    queue_family_properties.fill(count, fill).map(drop)
 }
 
 #[doc(alias = "vkGetPhysicalDeviceMemoryProperties")]
@@ -193,9 +208,14 @@ pub(crate) fn get_physical_device_memory_properties()
 
 #[doc(alias = "vkGetPhysicalDeviceMemoryProperties2")]
 pub(crate) fn get_physical_device_memory_properties2(
-    memory_properties: &mut vk::PhysicalDeviceMemoryProperties2<'_>,
+    mut memory_properties: OutputChain<'_, vk::PhysicalDeviceMemoryProperties2<'_>>,
 ) -> Result<(), Error> {
     memory_properties.memory_properties = memory::properties();
+    memory_properties.for_each_chained(|mut structure| {
+        if let Some(budget) = structure.cast::<vk::PhysicalDeviceMemoryBudgetPropertiesEXT<'_>>() {
+            memory::write_budget(budget);
+        }
+    });
     Ok(())
 }
 

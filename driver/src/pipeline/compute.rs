@@ -1,11 +1,12 @@
 //! Compute pipelines.
 
 use super::layout::PipelineLayout;
+use super::resources::ProgramResources;
 use crate::abi::error::Error;
 use crate::device::Device;
 use crate::physical_device::limits;
 use crate::shader_module::ShaderStage;
-use gaurast_spirv::{BuiltIn, Input, InputSource, Interface, Options, ShaderBinding, Stage};
+use gaurast_spirv::{BuiltIn, Input, InputSource, Interface, Options, Stage};
 use simdevice::program::compute::ComputeProgram;
 use simdevice::program::interface::ComputeInput;
 use std::sync::Arc;
@@ -16,7 +17,7 @@ pub(crate) struct ComputePipeline {
     /// The program that its workgroups run.
     pub(crate) program: Arc<ComputeProgram>,
     /// The resources that the program is bound to.
-    pub(crate) descriptors: Vec<ShaderBinding>,
+    pub(crate) resources: ProgramResources,
 }
 
 impl ComputePipeline {
@@ -56,6 +57,7 @@ impl ComputePipeline {
             )));
         }
         let inputs = inputs(interface);
+        let resources = ProgramResources::new(device, interface);
         let program = ComputeProgram::new(
             device.simulated().level(),
             shader.program,
@@ -66,7 +68,7 @@ impl ComputePipeline {
         .map_err(|error| Error::InvalidShader(error.to_string()))?;
         Ok(Self {
             program: Arc::new(program),
-            descriptors: shader.interface.descriptors,
+            resources,
         })
     }
 }

@@ -136,9 +136,9 @@ fn kind(ty: vk::DescriptorType) -> Option<DescriptorKind> {
         vk::DescriptorType::STORAGE_IMAGE => Some(DescriptorKind::StorageImage),
         vk::DescriptorType::UNIFORM_TEXEL_BUFFER => Some(DescriptorKind::UniformTexelBuffer),
         vk::DescriptorType::STORAGE_TEXEL_BUFFER => Some(DescriptorKind::StorageTexelBuffer),
-        vk::DescriptorType::UNIFORM_BUFFER | vk::DescriptorType::UNIFORM_BUFFER_DYNAMIC => {
-            Some(DescriptorKind::UniformBuffer)
-        }
+        vk::DescriptorType::UNIFORM_BUFFER
+        | vk::DescriptorType::UNIFORM_BUFFER_DYNAMIC
+        | vk::DescriptorType::INLINE_UNIFORM_BLOCK => Some(DescriptorKind::UniformBuffer),
         vk::DescriptorType::STORAGE_BUFFER | vk::DescriptorType::STORAGE_BUFFER_DYNAMIC => {
             Some(DescriptorKind::StorageBuffer)
         }

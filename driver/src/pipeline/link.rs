@@ -16,7 +16,7 @@ use simdevice::program::interface::{
 };
 use std::collections::HashMap;
 
-/// The outputs of a pipeline's programs that have an effect.
+/// The outputs of a pipeline's programs that have an effect, and what else of its state changes how they are linked.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct LiveOutputs<'a> {
     /// By colour attachment: whether anything is written to it, or made of its source's alpha.
@@ -25,6 +25,8 @@ pub(crate) struct LiveOutputs<'a> {
     pub(crate) second_source: bool,
     /// True if points are drawn, so that their size matters.
     pub(crate) points: bool,
+    /// True if the pass has views, each of which is a layer.
+    pub(crate) views: bool,
 }
 
 /// A location and a component of it.
@@ -134,7 +136,7 @@ fn fragment_programs(
     let inputs: Vec<_> = interface
         .inputs
         .iter()
-        .map(|input| fragment_input(input, varyings))
+        .map(|input| fragment_input(input, varyings, live_outputs.views))
         .collect();
     zero_inputs(&mut program, &inputs);
     let keeps_depth = interface.depth == DepthMode::NotWritten;
@@ -306,7 +308,8 @@ fn vertex_input(input: &Input, stream: impl Fn(u32) -> Option<usize>) -> Option<
             BuiltIn::BaseVertex => Some(VertexInput::BaseVertex),
             BuiltIn::BaseInstance => Some(VertexInput::BaseInstance),
             BuiltIn::DrawIndex => Some(VertexInput::DrawIndex),
-            // There is one view and one device, and their index is zero.
+            BuiltIn::ViewIndex => Some(VertexInput::ViewIndex),
+            // There is one device, and its index is zero.
             _ => None,
         },
     }
@@ -343,7 +346,7 @@ fn vertex_output(
     }
 }
 
-fn fragment_input(input: &Input, varyings: &Varyings) -> Option<FragmentInput> {
+fn fragment_input(input: &Input, varyings: &Varyings, views: bool) -> Option<FragmentInput> {
     match input.source {
         InputSource::Location {
             location,
@@ -380,6 +383,7 @@ fn fragment_input(input: &Input, varyings: &Varyings) -> Option<FragmentInput> {
                 // There are fewer samples than bits of the first word.
                 BuiltIn::SampleMask if component == 0 => Some(FragmentInput::SampleMask),
                 BuiltIn::Layer => Some(FragmentInput::Layer),
+                BuiltIn::ViewIndex if views => Some(FragmentInput::Layer),
                 BuiltIn::ViewportIndex => Some(FragmentInput::ViewportIndex),
                 _ => None,
             }
@@ -484,6 +488,7 @@ mod tests {
                 discards: false,
                 per_sample: false,
                 has_side_effects: false,
+                uses_addresses: false,
             },
         }
     }

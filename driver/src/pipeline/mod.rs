@@ -9,6 +9,7 @@ pub(crate) mod layout;
 mod link;
 pub(crate) mod primitives;
 mod reflect;
+pub(crate) mod resources;
 mod stages;
 pub(crate) mod state;
 
@@ -135,17 +136,29 @@ fn cache_header() -> Vec<u8> {
     header
 }
 
-/// Makes a pipeline of each create info. Vulkan lets the rest be skipped once one fails; their handles are null.
+/// Makes a pipeline of each create info. Vulkan lets the rest be skipped once one fails; their handles are null. Every
+/// pipeline is compiled when it is created, so that those which may not be are not created.
 fn create_each<T>(
     infos: &[T],
     pipelines: &mut [MaybeUninit<vk::Pipeline>],
+    flags: impl Fn(&T) -> vk::PipelineCreateFlags,
     mut create: impl FnMut(&T) -> Result<Pipeline, Error>,
-) -> Result<(), Error> {
+) -> Result<vk::Result, Error> {
+    use vk::PipelineCreateFlags as Flags;
     pipelines.fill(MaybeUninit::new(vk::Pipeline::null()));
+    let mut result = vk::Result::SUCCESS;
     for (place, info) in pipelines.iter_mut().zip(infos) {
+        let flags = flags(info);
+        if flags.contains(Flags::FAIL_ON_PIPELINE_COMPILE_REQUIRED) {
+            result = vk::Result::PIPELINE_COMPILE_REQUIRED;
+            if flags.contains(Flags::EARLY_RETURN_ON_FAILURE) {
+                break;
+            }
+            continue;
+        }
         place.write(handle::create(Arc::new(create(info)?)));
     }
-    Ok(())
+    Ok(result)
 }
 
 /// Says of creation feedback that there is none: it takes no time that anybody would want to know.
@@ -176,10 +189,10 @@ pub(crate) unsafe fn create_graphics_pipelines(
     device: &Device,
     create_infos: &[vk::GraphicsPipelineCreateInfo<'_>],
     pipelines: &mut [MaybeUninit<vk::Pipeline>],
-) -> Result<(), Error> {
+) -> Result<vk::Result, Error> {
     // SAFETY: the caller's promise.
     let create = |info: &_| unsafe { new_graphics_pipeline(device, info) };
-    create_each(create_infos, pipelines, create)
+    create_each(create_infos, pipelines, |info| info.flags, create)
 }
 
 /// # Safety
@@ -189,10 +202,10 @@ pub(crate) unsafe fn create_compute_pipelines(
     device: &Device,
     create_infos: &[vk::ComputePipelineCreateInfo<'_>],
     pipelines: &mut [MaybeUninit<vk::Pipeline>],
-) -> Result<(), Error> {
+) -> Result<vk::Result, Error> {
     // SAFETY: the caller's promise.
     let create = |info: &_| unsafe { new_compute_pipeline(device, info) };
-    create_each(create_infos, pipelines, create)
+    create_each(create_infos, pipelines, |info| info.flags, create)
 }
 
 #[doc(alias = "vkCreatePipelineCache")]

@@ -2,6 +2,7 @@
 
 use super::dynamic_state;
 use super::link::{self, LiveOutputs};
+use super::resources::ProgramResources;
 use super::stages;
 use super::state::{
     self, AttributeSource, Class, FixedFunctionState, GraphicsState, live_color_outputs,
@@ -11,7 +12,7 @@ use crate::abi::error::Error;
 use crate::device::Device;
 use crate::shader_module::ShaderStage;
 use ash::vk;
-use gaurast_spirv::{ShaderBinding, Stage};
+use gaurast_spirv::Stage;
 use simdevice::program::vertex::DrawPipeline;
 use simdevice::state::{DrawState, PolygonMode};
 use std::sync::Arc;
@@ -24,9 +25,9 @@ pub(crate) struct PrimitivePipeline {
     /// The sources of the vertex program's attributes.
     pub(crate) attributes: Vec<AttributeSource>,
     /// The resources that the vertex program is bound to.
-    pub(crate) vertex_descriptors: Vec<ShaderBinding>,
+    pub(crate) vertex_resources: ProgramResources,
     /// The resources that the fragment program is bound to.
-    pub(crate) fragment_descriptors: Vec<ShaderBinding>,
+    pub(crate) fragment_resources: ProgramResources,
     /// The fixed-function state, as far as it is static.
     pub(crate) fixed: FixedFunctionState,
     /// The state for the device, if nothing of it is dynamic.
@@ -77,16 +78,17 @@ impl PrimitivePipeline {
         if let Some(fragment) = &fragment {
             stages::warn_of_unwritten(device, &vertex.interface, &fragment.interface);
         }
-        let vertex_descriptors = vertex.interface.descriptors.clone();
-        let fragment_descriptors = fragment
-            .as_ref()
-            .map_or_else(Vec::new, |fragment| fragment.interface.descriptors.clone());
+        let vertex_resources = ProgramResources::new(device, &vertex.interface);
+        let fragment_resources = fragment.as_ref().map_or_else(Default::default, |fragment| {
+            ProgramResources::new(device, &fragment.interface)
+        });
         let color = live_color_outputs(info, &fixed);
         let live_outputs = LiveOutputs {
             color: &color,
             second_source: info.fragment_output.blend.iter().any(reads_second_source),
             points: state::class(fixed.draw.topology) == Class::Points
                 || fixed.draw.polygon_mode == PolygonMode::Point,
+            views: info.fragment_output.view_mask != 0,
         };
         let stream = |location| locations.iter().position(|(read, _)| *read == location);
         let programs = link::link(vertex, fragment, stream, live_outputs)?;
@@ -98,8 +100,8 @@ impl PrimitivePipeline {
         Ok(Self {
             programs: Arc::new(programs),
             attributes,
-            vertex_descriptors,
-            fragment_descriptors,
+            vertex_resources,
+            fragment_resources,
             state: is_static.then(|| Arc::new(fixed.draw_state())),
             fixed,
             dynamic,

@@ -74,6 +74,8 @@ pub(crate) struct PreRasterizationState<'a> {
     pub(crate) rasterization: vk::PipelineRasterizationStateCreateInfo<'a>,
     /// True if a primitive's last vertex, not its first, is the provoking one.
     pub(crate) provoking_last: bool,
+    /// Whether primitives are clipped at the near and far planes, if the pipeline says so.
+    pub(crate) depth_clip: Option<bool>,
 }
 
 /// The fragment stage, and the tests of depth and stencil.
@@ -100,6 +102,8 @@ pub(crate) struct FragmentOutputState<'a> {
     pub(crate) blend_constants: [f32; 4],
     /// The colour formats of the subpass; undefined where the attachment is unused.
     pub(crate) color_formats: Vec<vk::Format>,
+    /// The views that draws are for, a bit each; 0 without views.
+    pub(crate) view_mask: u32,
 }
 
 impl<'a> GraphicsState<'a> {
@@ -149,6 +153,13 @@ impl<'a> GraphicsState<'a> {
                 gathered.pre_rasterization.provoking_last = provoking.is_some_and(|state| {
                     state.provoking_vertex_mode == vk::ProvokingVertexModeEXT::LAST_VERTEX
                 });
+            }
+            if let Some(state) = valid::optional(info.p_rasterization_state) {
+                let clip = valid::find_in_chain::<
+                    vk::PipelineRasterizationDepthClipStateCreateInfoEXT<'_>,
+                >(state.p_next);
+                gathered.pre_rasterization.depth_clip =
+                    clip.map(|state| state.depth_clip_enable != vk::FALSE);
             }
             if !gathered.discards() {
                 read_fragments(info, &mut gathered)?;
@@ -252,6 +263,7 @@ unsafe fn read_fragments<'a>(
             gathered.fragment_output.blend_constants = state.blend_constants;
         }
         gathered.fragment_output.color_formats = formats.color;
+        gathered.fragment_output.view_mask = formats.view_mask;
     }
     Ok(())
 }
@@ -291,6 +303,8 @@ struct AttachmentFormats {
     color: Vec<vk::Format>,
     /// True if there is a depth or stencil attachment.
     has_depth_stencil: bool,
+    /// The views that draws are for, a bit each; 0 without views.
+    view_mask: u32,
 }
 
 /// The formats of the subpass, or of dynamic rendering, that a pipeline is for.
@@ -314,6 +328,7 @@ unsafe fn attachment_formats(
             return Ok(AttachmentFormats {
                 color: render_pass.color_formats(index).ok_or_else(missing)?,
                 has_depth_stencil: subpass.depth_stencil.is_some(),
+                view_mask: subpass.view_mask,
             });
         }
         let Some(rendering) = valid::find_in_chain::<vk::PipelineRenderingCreateInfo>(info.p_next)
@@ -329,6 +344,7 @@ unsafe fn attachment_formats(
             color: color.to_vec(),
             has_depth_stencil: rendering.depth_attachment_format != undefined
                 || rendering.stencil_attachment_format != undefined,
+            view_mask: rendering.view_mask,
         })
     }
 }
@@ -592,6 +608,7 @@ impl FixedFunctionState {
             viewports: Vec::new(),
             scissors: Vec::new(),
             depth_clamp: raster.depth_clamp_enable != vk::FALSE,
+            depth_clip: info.pre_rasterization.depth_clip,
             rasterizer_discard: raster.rasterizer_discard_enable != vk::FALSE,
             polygon_mode,
             cull_front: false,

@@ -268,6 +268,20 @@ pub(crate) struct Features {
     pub(crate) shader_integer_dot_product: bool,
     /// `maintenance4`.
     pub(crate) maintenance4: bool,
+    /// `formatA4R4G4B4`.
+    pub(crate) format_a4r4g4b4: bool,
+    /// `formatA4B4G4R4`.
+    pub(crate) format_a4b4g4r4: bool,
+    /// `borderColorSwizzle`.
+    pub(crate) border_color_swizzle: bool,
+    /// `borderColorSwizzleFromImage`.
+    pub(crate) border_color_swizzle_from_image: bool,
+    /// `customBorderColors`.
+    pub(crate) custom_border_colors: bool,
+    /// `customBorderColorWithoutFormat`.
+    pub(crate) custom_border_color_without_format: bool,
+    /// `depthClipEnable`.
+    pub(crate) depth_clip_enable: bool,
     /// `extendedDynamicState`.
     pub(crate) extended_dynamic_state: bool,
     /// `extendedDynamicState2`.
@@ -282,6 +296,12 @@ pub(crate) struct Features {
     pub(crate) provoking_vertex_last: bool,
     /// `transformFeedbackPreservesProvokingVertex`.
     pub(crate) transform_feedback_preserves_provoking_vertex: bool,
+    /// `robustBufferAccess2`.
+    pub(crate) robust_buffer_access2: bool,
+    /// `robustImageAccess2`.
+    pub(crate) robust_image_access2: bool,
+    /// `nullDescriptor`.
+    pub(crate) null_descriptor: bool,
     /// `texelBufferAlignment`.
     pub(crate) texel_buffer_alignment: bool,
     /// `vertexAttributeInstanceRateDivisor`.
@@ -351,6 +371,7 @@ pub(crate) const SUPPORTED: Features = Features {
     large_points: true,
     alpha_to_one: true,
     multi_viewport: true,
+    sampler_anisotropy: true,
     texture_compression_bc: true,
     occlusion_query_precise: true,
     pipeline_statistics_query: true,
@@ -374,6 +395,7 @@ pub(crate) const SUPPORTED: Features = Features {
     storage_buffer16_bit_access: true,
     uniform_and_storage_buffer16_bit_access: true,
     storage_push_constant16: true,
+    multiview: true,
     shader_draw_parameters: true,
     sampler_mirror_clamp_to_edge: true,
     draw_indirect_count: true,
@@ -384,6 +406,7 @@ pub(crate) const SUPPORTED: Features = Features {
     shader_shared_int64_atomics: true,
     shader_float16: true,
     shader_int8: true,
+    descriptor_indexing: true,
     shader_uniform_texel_buffer_array_dynamic_indexing: true,
     shader_storage_texel_buffer_array_dynamic_indexing: true,
     shader_uniform_buffer_array_non_uniform_indexing: true,
@@ -392,9 +415,17 @@ pub(crate) const SUPPORTED: Features = Features {
     shader_storage_image_array_non_uniform_indexing: true,
     shader_uniform_texel_buffer_array_non_uniform_indexing: true,
     shader_storage_texel_buffer_array_non_uniform_indexing: true,
+    descriptor_binding_uniform_buffer_update_after_bind: true,
+    descriptor_binding_sampled_image_update_after_bind: true,
+    descriptor_binding_storage_image_update_after_bind: true,
+    descriptor_binding_storage_buffer_update_after_bind: true,
+    descriptor_binding_uniform_texel_buffer_update_after_bind: true,
+    descriptor_binding_storage_texel_buffer_update_after_bind: true,
     descriptor_binding_update_unused_while_pending: true,
     descriptor_binding_partially_bound: true,
+    descriptor_binding_variable_descriptor_count: true,
     runtime_descriptor_array: true,
+    sampler_filter_minmax: true,
     scalar_block_layout: true,
     imageless_framebuffer: true,
     uniform_buffer_standard_layout: true,
@@ -402,12 +433,17 @@ pub(crate) const SUPPORTED: Features = Features {
     separate_depth_stencil_layouts: true,
     host_query_reset: true,
     timeline_semaphore: true,
+    buffer_device_address: true,
     vulkan_memory_model: true,
     vulkan_memory_model_device_scope: true,
+    vulkan_memory_model_availability_visibility_chains: true,
     shader_output_viewport_index: true,
     shader_output_layer: true,
     subgroup_broadcast_dynamic_id: true,
     robust_image_access: true,
+    inline_uniform_block: true,
+    descriptor_binding_inline_uniform_block_update_after_bind: true,
+    pipeline_creation_cache_control: true,
     private_data: true,
     shader_demote_to_helper_invocation: true,
     shader_terminate_invocation: true,
@@ -417,10 +453,20 @@ pub(crate) const SUPPORTED: Features = Features {
     shader_zero_initialize_workgroup_memory: true,
     dynamic_rendering: true,
     maintenance4: true,
+    format_a4r4g4b4: true,
+    format_a4b4g4r4: true,
+    border_color_swizzle: true,
+    border_color_swizzle_from_image: true,
+    custom_border_colors: true,
+    custom_border_color_without_format: true,
+    depth_clip_enable: true,
     extended_dynamic_state: true,
     extended_dynamic_state2: true,
     index_type_uint8: true,
     provoking_vertex_last: true,
+    robust_buffer_access2: true,
+    robust_image_access2: true,
+    null_descriptor: true,
     texel_buffer_alignment: true,
     vertex_attribute_instance_rate_divisor: true,
     vertex_attribute_instance_rate_zero_divisor: true,
@@ -579,6 +625,13 @@ impl Features {
         dynamic_rendering: false,
         shader_integer_dot_product: false,
         maintenance4: false,
+        format_a4r4g4b4: false,
+        format_a4b4g4r4: false,
+        border_color_swizzle: false,
+        border_color_swizzle_from_image: false,
+        custom_border_colors: false,
+        custom_border_color_without_format: false,
+        depth_clip_enable: false,
         extended_dynamic_state: false,
         extended_dynamic_state2: false,
         extended_dynamic_state2_logic_op: false,
@@ -586,6 +639,9 @@ impl Features {
         index_type_uint8: false,
         provoking_vertex_last: false,
         transform_feedback_preserves_provoking_vertex: false,
+        robust_buffer_access2: false,
+        robust_image_access2: false,
+        null_descriptor: false,
         texel_buffer_alignment: false,
         vertex_attribute_instance_rate_divisor: false,
         vertex_attribute_instance_rate_zero_divisor: false,
@@ -613,7 +669,7 @@ impl Features {
     };
 
     /// The features by their names in Rust.
-    pub(crate) fn list(&self) -> [(&'static str, bool); 160] {
+    pub(crate) fn list(&self) -> [(&'static str, bool); 170] {
         [
             ("robust_buffer_access", self.robust_buffer_access),
             ("full_draw_index_uint32", self.full_draw_index_uint32),
@@ -921,6 +977,19 @@ impl Features {
                 self.shader_integer_dot_product,
             ),
             ("maintenance4", self.maintenance4),
+            ("format_a4r4g4b4", self.format_a4r4g4b4),
+            ("format_a4b4g4r4", self.format_a4b4g4r4),
+            ("border_color_swizzle", self.border_color_swizzle),
+            (
+                "border_color_swizzle_from_image",
+                self.border_color_swizzle_from_image,
+            ),
+            ("custom_border_colors", self.custom_border_colors),
+            (
+                "custom_border_color_without_format",
+                self.custom_border_color_without_format,
+            ),
+            ("depth_clip_enable", self.depth_clip_enable),
             ("extended_dynamic_state", self.extended_dynamic_state),
             ("extended_dynamic_state2", self.extended_dynamic_state2),
             (
@@ -937,6 +1006,9 @@ impl Features {
                 "transform_feedback_preserves_provoking_vertex",
                 self.transform_feedback_preserves_provoking_vertex,
             ),
+            ("robust_buffer_access2", self.robust_buffer_access2),
+            ("robust_image_access2", self.robust_image_access2),
+            ("null_descriptor", self.null_descriptor),
             ("texel_buffer_alignment", self.texel_buffer_alignment),
             (
                 "vertex_attribute_instance_rate_divisor",
@@ -1430,6 +1502,21 @@ impl Features {
         if let Some(out) = structure.cast::<vk::PhysicalDeviceDynamicRenderingFeatures<'_>>() {
             out.dynamic_rendering = self.dynamic_rendering.into();
         }
+        if let Some(out) = structure.cast::<vk::PhysicalDevice4444FormatsFeaturesEXT<'_>>() {
+            out.format_a4r4g4b4 = self.format_a4r4g4b4.into();
+            out.format_a4b4g4r4 = self.format_a4b4g4r4.into();
+        }
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceBorderColorSwizzleFeaturesEXT<'_>>() {
+            out.border_color_swizzle = self.border_color_swizzle.into();
+            out.border_color_swizzle_from_image = self.border_color_swizzle_from_image.into();
+        }
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceCustomBorderColorFeaturesEXT<'_>>() {
+            out.custom_border_colors = self.custom_border_colors.into();
+            out.custom_border_color_without_format = self.custom_border_color_without_format.into();
+        }
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceDepthClipEnableFeaturesEXT<'_>>() {
+            out.depth_clip_enable = self.depth_clip_enable.into();
+        }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceExtendedDynamicStateFeaturesEXT<'_>>()
         {
             out.extended_dynamic_state = self.extended_dynamic_state.into();
@@ -1449,6 +1536,11 @@ impl Features {
             out.provoking_vertex_last = self.provoking_vertex_last.into();
             out.transform_feedback_preserves_provoking_vertex =
                 self.transform_feedback_preserves_provoking_vertex.into();
+        }
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceRobustness2FeaturesEXT<'_>>() {
+            out.robust_buffer_access2 = self.robust_buffer_access2.into();
+            out.robust_image_access2 = self.robust_image_access2.into();
+            out.null_descriptor = self.null_descriptor.into();
         }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceTexelBufferAlignmentFeaturesEXT<'_>>()
         {
@@ -1839,6 +1931,31 @@ impl Features {
             self.dynamic_rendering |= requested.dynamic_rendering != vk::FALSE;
         }
         if let Some(requested) =
+            valid::cast::<vk::PhysicalDevice4444FormatsFeaturesEXT<'_>>(structure)
+        {
+            self.format_a4r4g4b4 |= requested.format_a4r4g4b4 != vk::FALSE;
+            self.format_a4b4g4r4 |= requested.format_a4b4g4r4 != vk::FALSE;
+        }
+        if let Some(requested) =
+            valid::cast::<vk::PhysicalDeviceBorderColorSwizzleFeaturesEXT<'_>>(structure)
+        {
+            self.border_color_swizzle |= requested.border_color_swizzle != vk::FALSE;
+            self.border_color_swizzle_from_image |=
+                requested.border_color_swizzle_from_image != vk::FALSE;
+        }
+        if let Some(requested) =
+            valid::cast::<vk::PhysicalDeviceCustomBorderColorFeaturesEXT<'_>>(structure)
+        {
+            self.custom_border_colors |= requested.custom_border_colors != vk::FALSE;
+            self.custom_border_color_without_format |=
+                requested.custom_border_color_without_format != vk::FALSE;
+        }
+        if let Some(requested) =
+            valid::cast::<vk::PhysicalDeviceDepthClipEnableFeaturesEXT<'_>>(structure)
+        {
+            self.depth_clip_enable |= requested.depth_clip_enable != vk::FALSE;
+        }
+        if let Some(requested) =
             valid::cast::<vk::PhysicalDeviceExtendedDynamicStateFeaturesEXT<'_>>(structure)
         {
             self.extended_dynamic_state |= requested.extended_dynamic_state != vk::FALSE;
@@ -1863,6 +1980,13 @@ impl Features {
             self.provoking_vertex_last |= requested.provoking_vertex_last != vk::FALSE;
             self.transform_feedback_preserves_provoking_vertex |=
                 requested.transform_feedback_preserves_provoking_vertex != vk::FALSE;
+        }
+        if let Some(requested) =
+            valid::cast::<vk::PhysicalDeviceRobustness2FeaturesEXT<'_>>(structure)
+        {
+            self.robust_buffer_access2 |= requested.robust_buffer_access2 != vk::FALSE;
+            self.robust_image_access2 |= requested.robust_image_access2 != vk::FALSE;
+            self.null_descriptor |= requested.null_descriptor != vk::FALSE;
         }
         if let Some(requested) =
             valid::cast::<vk::PhysicalDeviceTexelBufferAlignmentFeaturesEXT<'_>>(structure)
@@ -1915,6 +2039,16 @@ impl Features {
 /// The extension without which the features of a structure can't be enabled; features of core need none.
 pub(crate) fn extension_of(structure: vk::StructureType) -> Option<&'static CStr> {
     match structure {
+        vk::PhysicalDevice4444FormatsFeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_4444_formats"),
+        vk::PhysicalDeviceBorderColorSwizzleFeaturesEXT::STRUCTURE_TYPE => {
+            Some(c"VK_EXT_border_color_swizzle")
+        }
+        vk::PhysicalDeviceCustomBorderColorFeaturesEXT::STRUCTURE_TYPE => {
+            Some(c"VK_EXT_custom_border_color")
+        }
+        vk::PhysicalDeviceDepthClipEnableFeaturesEXT::STRUCTURE_TYPE => {
+            Some(c"VK_EXT_depth_clip_enable")
+        }
         vk::PhysicalDeviceExtendedDynamicStateFeaturesEXT::STRUCTURE_TYPE => {
             Some(c"VK_EXT_extended_dynamic_state")
         }
@@ -1927,6 +2061,7 @@ pub(crate) fn extension_of(structure: vk::StructureType) -> Option<&'static CStr
         vk::PhysicalDeviceProvokingVertexFeaturesEXT::STRUCTURE_TYPE => {
             Some(c"VK_EXT_provoking_vertex")
         }
+        vk::PhysicalDeviceRobustness2FeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_robustness2"),
         vk::PhysicalDeviceTexelBufferAlignmentFeaturesEXT::STRUCTURE_TYPE => {
             Some(c"VK_EXT_texel_buffer_alignment")
         }
@@ -1958,15 +2093,32 @@ pub(crate) const MANDATORY: &[(u32, &[&str])] = &[
     (
         vk::API_VERSION_1_2,
         &[
+            "descriptor_binding_partially_bound",
+            "descriptor_binding_sampled_image_update_after_bind",
+            "descriptor_binding_storage_buffer_update_after_bind",
+            "descriptor_binding_storage_image_update_after_bind",
+            "descriptor_binding_storage_texel_buffer_update_after_bind",
+            "descriptor_binding_uniform_texel_buffer_update_after_bind",
+            "descriptor_binding_update_unused_while_pending",
+            "descriptor_indexing",
             "draw_indirect_count",
             "host_query_reset",
             "imageless_framebuffer",
+            "runtime_descriptor_array",
+            "sampler_filter_minmax",
             "sampler_mirror_clamp_to_edge",
             "separate_depth_stencil_layouts",
             "shader_int64",
             "shader_output_layer",
             "shader_output_viewport_index",
+            "shader_sampled_image_array_dynamic_indexing",
+            "shader_sampled_image_array_non_uniform_indexing",
+            "shader_storage_buffer_array_dynamic_indexing",
+            "shader_storage_buffer_array_non_uniform_indexing",
+            "shader_storage_texel_buffer_array_dynamic_indexing",
             "shader_subgroup_extended_types",
+            "shader_uniform_texel_buffer_array_dynamic_indexing",
+            "shader_uniform_texel_buffer_array_non_uniform_indexing",
             "storage_buffer8_bit_access",
             "subgroup_broadcast_dynamic_id",
             "timeline_semaphore",
@@ -1978,6 +2130,7 @@ pub(crate) const MANDATORY: &[(u32, &[&str])] = &[
         &[
             "buffer_device_address",
             "compute_full_subgroups",
+            "descriptor_binding_inline_uniform_block_update_after_bind",
             "dynamic_rendering",
             "inline_uniform_block",
             "maintenance4",

@@ -470,10 +470,16 @@ pub(crate) struct Properties {
     pub(crate) uniform_texel_buffer_offset_single_texel_alignment: bool,
     /// `maxBufferSize`.
     pub(crate) max_buffer_size: vk::DeviceSize,
+    /// `maxCustomBorderColorSamplers`.
+    pub(crate) max_custom_border_color_samplers: u32,
     /// `provokingVertexModePerPipeline`.
     pub(crate) provoking_vertex_mode_per_pipeline: bool,
     /// `transformFeedbackPreservesTriangleFanProvokingVertex`.
     pub(crate) transform_feedback_preserves_triangle_fan_provoking_vertex: bool,
+    /// `robustStorageBufferAccessSizeAlignment`.
+    pub(crate) robust_storage_buffer_access_size_alignment: vk::DeviceSize,
+    /// `robustUniformBufferAccessSizeAlignment`.
+    pub(crate) robust_uniform_buffer_access_size_alignment: vk::DeviceSize,
     /// `maxVertexAttribDivisor`.
     pub(crate) max_vertex_attrib_divisor: u32,
     /// `tileSize`.
@@ -1105,11 +1111,21 @@ impl Properties {
                 .uniform_texel_buffer_offset_single_texel_alignment
                 .into();
         }
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceCustomBorderColorPropertiesEXT<'_>>()
+        {
+            out.max_custom_border_color_samplers = self.max_custom_border_color_samplers;
+        }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceProvokingVertexPropertiesEXT<'_>>() {
             out.provoking_vertex_mode_per_pipeline = self.provoking_vertex_mode_per_pipeline.into();
             out.transform_feedback_preserves_triangle_fan_provoking_vertex = self
                 .transform_feedback_preserves_triangle_fan_provoking_vertex
                 .into();
+        }
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceRobustness2PropertiesEXT<'_>>() {
+            out.robust_storage_buffer_access_size_alignment =
+                self.robust_storage_buffer_access_size_alignment;
+            out.robust_uniform_buffer_access_size_alignment =
+                self.robust_uniform_buffer_access_size_alignment;
         }
         if let Some(out) =
             structure.cast::<vk::PhysicalDeviceVertexAttributeDivisorPropertiesEXT<'_>>()

@@ -4,8 +4,10 @@ use super::memory::Memory;
 use crate::abi::error::Error;
 use crate::abi::handle::{self, objects};
 use crate::abi::valid::{self, OutputChain};
+use crate::device::Device;
+use crate::device_addresses::Addresses;
 use crate::physical_device::formats;
-use crate::physical_device::limits::MIN_BUFFER_OFFSET_ALIGNMENT;
+use crate::physical_device::limits::{MAX_TEXEL_BUFFER_ELEMENTS, MIN_BUFFER_OFFSET_ALIGNMENT};
 use crate::physical_device::memory::ALL_TYPE_BITS;
 use ash::vk;
 use simdevice::packet::BufferRange;
@@ -20,6 +22,10 @@ pub(crate) const ALIGNMENT: u64 = 64;
 pub(crate) struct Buffer {
     size: u64,
     memory: OnceLock<(Arc<Allocation>, u64)>,
+    /// The device's addresses, if the buffer is to have one.
+    addresses: Option<Arc<Addresses>>,
+    /// Its address, once it is bound.
+    address: OnceLock<u64>,
 }
 
 objects! {
@@ -43,12 +49,27 @@ const VIEWED: BufferRules = BufferRules {
 };
 
 impl Buffer {
-    /// A buffer of `size` bytes, not yet bound to memory.
-    pub(crate) fn new(size: u64) -> Self {
+    /// A buffer of `size` bytes, not yet bound to memory. With `addresses` it will have one of those.
+    pub(crate) fn new(size: u64, addresses: Option<Arc<Addresses>>) -> Self {
         Self {
             size,
             memory: OnceLock::new(),
+            addresses,
+            address: OnceLock::new(),
         }
+    }
+
+    /// The address of its first byte.
+    ///
+    /// # Errors
+    /// [`Error::InvalidUsage`] if it is not bound, or was not made to have an address.
+    fn address(&self) -> Result<vk::DeviceAddress, Error> {
+        self.address.get().copied().ok_or_else(|| {
+            Error::usage(
+                "VUID-VkBufferDeviceAddressInfo-buffer-02601",
+                "the buffer is not bound, or its usage has no SHADER_DEVICE_ADDRESS",
+            )
+        })
     }
 
     /// The memory that it needs, of any type.
@@ -72,7 +93,17 @@ impl Buffer {
                 "VUID-vkBindBufferMemory-buffer-07459",
                 "the buffer is bound already",
             )
-        })
+        })?;
+        if let (Some(addresses), Some((memory, offset))) = (&self.addresses, self.memory.get()) {
+            self.address.get_or_init(|| {
+                addresses.add(BufferRange {
+                    memory: Arc::clone(memory),
+                    offset: *offset,
+                    size: self.size,
+                })
+            });
+        }
+        Ok(())
     }
 
     /// The bytes from `offset` on: `size` of them, or with `None` (`VK_WHOLE_SIZE`) all that follow.
@@ -115,6 +146,14 @@ impl Buffer {
     /// [`Error::InvalidUsage`] if the buffer is not bound.
     pub(crate) fn whole(&self, rules: &BufferRules) -> Result<BufferRange, Error> {
         self.range(0, None, rules)
+    }
+}
+
+impl Drop for Buffer {
+    fn drop(&mut self) {
+        if let (Some(addresses), Some(&address)) = (&self.addresses, self.address.get()) {
+            addresses.remove(address);
+        }
     }
 }
 
@@ -162,7 +201,10 @@ pub(crate) fn fits(
 ///
 /// # Safety
 /// The create info's chain is valid.
-unsafe fn new_buffer(info: &vk::BufferCreateInfo<'_>) -> Result<Buffer, Error> {
+unsafe fn new_buffer(
+    info: &vk::BufferCreateInfo<'_>,
+    addresses: &Arc<Addresses>,
+) -> Result<Buffer, Error> {
     // SAFETY: the caller's promise.
     let external =
         unsafe { valid::find_in_chain::<vk::ExternalMemoryBufferCreateInfo>(info.p_next) };
@@ -185,7 +227,13 @@ unsafe fn new_buffer(info: &vk::BufferCreateInfo<'_>) -> Result<Buffer, Error> {
             "the size of a buffer is 0",
         ));
     }
-    Ok(Buffer::new(info.size))
+    let is_addressed = info
+        .usage
+        .contains(vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS);
+    Ok(Buffer::new(
+        info.size,
+        is_addressed.then(|| Arc::clone(addresses)),
+    ))
 }
 
 /// Writes requirements and, where asked for, that no dedicated allocation is wanted.
@@ -207,10 +255,33 @@ pub(crate) fn fill_requirements(
 /// The create info's chain is valid.
 #[doc(alias = "vkCreateBuffer")]
 pub(crate) unsafe fn create_buffer(
+    device: &Device,
     create_info: &vk::BufferCreateInfo<'_>,
 ) -> Result<Arc<Buffer>, Error> {
     // SAFETY: the caller's promise.
-    unsafe { new_buffer(create_info) }.map(Arc::new)
+    unsafe { new_buffer(create_info, device.addresses()) }.map(Arc::new)
+}
+
+/// # Safety
+/// The buffer is live.
+#[doc(alias = "vkGetBufferDeviceAddress")]
+pub(crate) unsafe fn get_buffer_device_address(
+    info: &vk::BufferDeviceAddressInfo<'_>,
+) -> Result<vk::DeviceAddress, Error> {
+    // SAFETY: the caller's promise.
+    unsafe { handle::get(info.buffer)? }.address()
+}
+
+/// What an address is asked for by in a capture is the address; none is replayed.
+///
+/// # Safety
+/// The buffer is live.
+#[doc(alias = "vkGetBufferOpaqueCaptureAddress")]
+pub(crate) unsafe fn get_buffer_opaque_capture_address(
+    info: &vk::BufferDeviceAddressInfo<'_>,
+) -> Result<u64, Error> {
+    // SAFETY: the caller's promise.
+    unsafe { get_buffer_device_address(info) }
 }
 
 #[doc(alias = "vkGetBufferMemoryRequirements")]
@@ -240,7 +311,7 @@ pub(crate) unsafe fn get_device_buffer_memory_requirements(
     memory_requirements: OutputChain<'_, vk::MemoryRequirements2<'_>>,
 ) -> Result<(), Error> {
     // SAFETY: the caller's promise.
-    let buffer = unsafe { new_buffer(valid::input(info.p_create_info)?)? };
+    let buffer = unsafe { new_buffer(valid::input(info.p_create_info)?, &Arc::default())? };
     fill_requirements(memory_requirements, buffer.requirements())
 }
 
@@ -291,10 +362,15 @@ pub(crate) unsafe fn create_buffer_view(
     }
     // SAFETY: the caller's promise.
     let buffer = unsafe { handle::get(info.buffer)? };
-    Ok(Arc::new(BufferView {
-        range: buffer.range(info.offset, size, &VIEWED)?,
-        format,
-    }))
+    let range = buffer.range(info.offset, size, &VIEWED)?;
+    let texels = range.size / format.texel_size().max(1) as u64;
+    if texels > u64::from(MAX_TEXEL_BUFFER_ELEMENTS) {
+        return Err(Error::usage(
+            "VUID-VkBufferViewCreateInfo-range-00930",
+            format!("a texel buffer of {texels} texels; there may be {MAX_TEXEL_BUFFER_ELEMENTS}"),
+        ));
+    }
+    Ok(Arc::new(BufferView { range, format }))
 }
 
 #[cfg(test)]
@@ -303,7 +379,7 @@ mod tests {
 
     #[test]
     fn ranges_lie_inside_the_buffer() {
-        let buffer = Buffer::new(100);
+        let buffer = Buffer::new(100, None);
         assert!(buffer.whole(&VIEWED).is_err(), "not bound");
         let memory = Allocation::new_zeroed(4096).unwrap();
         assert!(buffer.bind(memory.clone(), 4032).is_err(), "does not fit");

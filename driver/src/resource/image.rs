@@ -185,11 +185,14 @@ unsafe fn new_image(info: &vk::ImageCreateInfo<'_>) -> Result<Image, Error> {
     if external.is_some_and(|external| !external.handle_types.is_empty()) {
         return Err(Error::FeatureNotPresent("external memory".into()));
     }
+    // SAFETY: the caller's promise.
+    let stencil = unsafe { valid::find_in_chain::<vk::ImageStencilUsageCreateInfo>(info.p_next) };
     let supported = formats::image_properties(ImageQuery {
         format: info.format,
         ty: info.image_type,
         tiling: info.tiling,
-        usage: info.usage,
+        // The stencil aspect may be used otherwise than the depth.
+        usage: info.usage | stencil.map_or_else(Default::default, |it| it.stencil_usage),
         flags: info.flags,
     })?;
     let (extent, max) = (info.extent, supported.max_extent);

@@ -167,6 +167,12 @@ pub(crate) unsafe fn flush_mapped_memory_ranges(
     })
 }
 
+/// Memory itself has no address, only the buffers that are bound to it, so that nothing of it is captured.
+#[doc(alias = "vkGetDeviceMemoryOpaqueCaptureAddress")]
+pub(crate) fn get_device_memory_opaque_capture_address() -> Result<u64, Error> {
+    Ok(0)
+}
+
 /// No memory type is lazily allocated, so what is committed is all of it.
 #[doc(alias = "vkGetDeviceMemoryCommitment")]
 pub(crate) fn get_device_memory_commitment(memory: &Memory) -> Result<vk::DeviceSize, Error> {

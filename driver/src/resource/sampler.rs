@@ -2,6 +2,7 @@
 
 use crate::abi::error::Error;
 use crate::abi::handle::objects;
+use crate::abi::valid;
 use crate::convert;
 use crate::physical_device::limits;
 use ash::vk;
@@ -18,15 +19,18 @@ pub(crate) struct Sampler {
 objects! { vk::Sampler => Sampler; }
 
 impl Sampler {
-    /// A sampler as its create info asks for.
+    /// A sampler as its create info and what is chained to it ask for.
     ///
     /// # Errors
-    /// [`Error::FeatureNotPresent`] for anisotropy, and for filters, modes and colours of extensions;
-    /// [`Error::InvalidUsage`] for a comparison that is none.
-    pub(crate) fn new(info: &vk::SamplerCreateInfo<'_>) -> Result<Self, Error> {
-        if info.anisotropy_enable != vk::FALSE {
-            return Err(Error::FeatureNotPresent("samplerAnisotropy".into()));
-        }
+    /// [`Error::FeatureNotPresent`] for filters, modes and colours of extensions; [`Error::InvalidUsage`] for a comparison
+    /// that is none.
+    pub(crate) fn new(
+        info: &vk::SamplerCreateInfo<'_>,
+        reduction: Option<vk::SamplerReductionMode>,
+        custom_border: Option<vk::ClearColorValue>,
+    ) -> Result<Self, Error> {
+        let is_anisotropic = info.anisotropy_enable != vk::FALSE;
+        let most = limits::MAX_SAMPLER_ANISOTROPY;
         let [u, v, w] = [
             info.address_mode_u,
             info.address_mode_v,
@@ -53,16 +57,55 @@ impl Sampler {
                 min_lod: info.min_lod,
                 max_lod: info.max_lod,
                 compare_op,
-                border_color: convert::border_color(info.border_color)?,
+                border_color: match custom_border {
+                    Some(color) => convert::custom_border_color(color),
+                    None => convert::border_color(info.border_color)?,
+                },
                 unnormalized_coordinates: info.unnormalized_coordinates != vk::FALSE,
+                max_anisotropy: match is_anisotropic {
+                    true => info.max_anisotropy.clamp(1.0, most),
+                    false => 1.0,
+                },
+                reduction: match reduction {
+                    Some(mode) => convert::reduction(mode)?,
+                    None => texture::Reduction::WeightedAverage,
+                },
             },
         })
     }
 }
 
+/// # Safety
+/// The create info's chain is valid.
 #[doc(alias = "vkCreateSampler")]
-pub(crate) fn create_sampler(
+pub(crate) unsafe fn create_sampler(
     create_info: &vk::SamplerCreateInfo<'_>,
 ) -> Result<Arc<Sampler>, Error> {
-    Sampler::new(create_info).map(Arc::new)
+    // SAFETY: the caller's promise.
+    let (reduction, border) = unsafe {
+        (
+            valid::find_in_chain::<vk::SamplerReductionModeCreateInfo<'_>>(create_info.p_next),
+            valid::find_in_chain::<vk::SamplerCustomBorderColorCreateInfoEXT<'_>>(
+                create_info.p_next,
+            ),
+        )
+    };
+    let is_custom = matches!(
+        create_info.border_color,
+        vk::BorderColor::FLOAT_CUSTOM_EXT | vk::BorderColor::INT_CUSTOM_EXT
+    );
+    if is_custom && border.is_none() {
+        return Err(Error::usage(
+            "VUID-VkSamplerCreateInfo-borderColor-04011",
+            "the border colour is a custom one, and there is none",
+        ));
+    }
+    Sampler::new(
+        create_info,
+        reduction.map(|info| info.reduction_mode),
+        border
+            .filter(|_| is_custom)
+            .map(|info| info.custom_border_color),
+    )
+    .map(Arc::new)
 }

@@ -46,6 +46,8 @@ formats! {
     R4G4UnormPack8: Unorm, G 4 R 4;
     R4G4B4A4UnormPack16: Unorm, A 4 B 4 G 4 R 4;
     B4G4R4A4UnormPack16: Unorm, A 4 R 4 G 4 B 4;
+    A4R4G4B4UnormPack16: Unorm, B 4 G 4 R 4 A 4;
+    A4B4G4R4UnormPack16: Unorm, R 4 G 4 B 4 A 4;
     R5G6B5UnormPack16: Unorm, B 5 G 6 R 5;
     B5G6R5UnormPack16: Unorm, R 5 G 6 B 5;
     R5G5B5A1UnormPack16: Unorm, A 1 B 5 G 5 R 5;

@@ -19,6 +19,8 @@ struct Attribute<'a> {
 /// The inputs of a draw's vertex program.
 pub(super) struct Fetcher<'a> {
     draw: &'a Draw,
+    /// The view that is drawn.
+    view: u32,
     attributes: Vec<Attribute<'a>>,
     /// Inputs that differ from vertex to vertex and are no attributes.
     numbers: Vec<(u32, VertexInput)>,
@@ -27,8 +29,8 @@ pub(super) struct Fetcher<'a> {
 }
 
 impl<'a> Fetcher<'a> {
-    /// Finds out what the draw's program reads, and sets what is the same for all its vertices.
-    pub(super) fn new(draw: &'a Draw, machine: &mut Machine) -> Self {
+    /// Finds out what the draw's program reads, and sets what is the same for all its vertices; `view` is the view's number.
+    pub(super) fn new(draw: &'a Draw, view: u32, machine: &mut Machine) -> Self {
         let mut attributes: Vec<Attribute<'a>> = Vec::new();
         let mut numbers = Vec::new();
         for &(slot, _, input) in &draw.pipeline.vertex.inputs {
@@ -53,11 +55,13 @@ impl<'a> Fetcher<'a> {
                 | VertexInput::InstanceIndex
                 | VertexInput::BaseVertex
                 | VertexInput::BaseInstance
-                | VertexInput::DrawIndex => numbers.push((slot, input)),
+                | VertexInput::DrawIndex
+                | VertexInput::ViewIndex => numbers.push((slot, input)),
             }
         }
         Self {
             draw,
+            view,
             attributes,
             numbers,
             bytes: Vec::new(),
@@ -123,6 +127,7 @@ impl<'a> Fetcher<'a> {
                 VertexInput::BaseVertex => machine.fill_input(slot, offset),
                 VertexInput::BaseInstance => machine.fill_input(slot, draw.first_instance),
                 VertexInput::DrawIndex => machine.fill_input(slot, draw.draw_index),
+                VertexInput::ViewIndex => machine.fill_input(slot, self.view),
                 VertexInput::Attribute { .. } => {}
             }
         }

@@ -62,6 +62,8 @@ pub(crate) struct Surface {
     pub area: Rect,
     /// How many layers there are.
     pub layers: u32,
+    /// The layer that all is drawn to, which the vertex program knows as its view; without it the program says the layer.
+    pub view: Option<u32>,
     /// The depth attachment's format.
     pub depth: Option<Format>,
 }
@@ -110,9 +112,10 @@ impl<'a> FrontEnd<'a> {
             primitives.div_ceil(SEGMENT).saturating_mul(instances)
         };
         let viewports = state.viewports.iter();
+        let clip_depth = state.depth_clip.unwrap_or(!state.depth_clamp);
         let transforms = viewports
             .clone()
-            .map(|viewport| Transform::new(viewport, state.depth_clamp));
+            .map(|viewport| Transform::new(viewport, clip_depth));
         let scissors = state
             .scissors
             .iter()
@@ -173,6 +176,7 @@ impl<'a> FrontEnd<'a> {
             regions: &self.regions,
             grid: self.grid(),
             layers: self.surface.layers,
+            view: self.surface.view,
             depth_unit: DepthUnit::of(self.surface.depth),
         };
         let resources = self.prepared.resources();
@@ -271,7 +275,7 @@ impl<'a> Worker<'a> {
     ) -> Self {
         let mut machine = front.draw.pipeline.vertex.machines.lend();
         let shader = Shader {
-            fetcher: Fetcher::new(front.draw, &mut machine),
+            fetcher: Fetcher::new(front.draw, front.surface.view.unwrap_or(0), &mut machine),
             machine,
             outputs: setup.outputs,
             takes_optional: setup.outputs.has_optional(draws_points(setup.state)),

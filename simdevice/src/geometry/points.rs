@@ -33,7 +33,7 @@ impl<'a> PointShader<'a> {
         Self {
             draw,
             shader: Shader {
-                fetcher: Fetcher::new(draw, &mut machine),
+                fetcher: Fetcher::new(draw, 0, &mut machine),
                 machine,
                 outputs: &program.outputs,
                 takes_optional: false,

@@ -52,6 +52,8 @@ pub(super) struct Setup<'a> {
     pub regions: &'a [Rect],
     pub grid: Grid,
     pub layers: u32,
+    /// The layer that all is drawn to, whatever the program says.
+    pub view: Option<u32>,
     pub depth_unit: DepthUnit,
 }
 
@@ -148,14 +150,17 @@ impl<'a> SegmentSetup<'a> {
     }
 
     /// The provoking vertex says which layer and viewport a primitive is drawn to; what doesn't exist is the last
-    /// layer, or the first viewport.
+    /// layer, or the first viewport. A view is its own layer.
     fn choose_target(&self, current: &mut AssembledPrimitive) {
+        current.layer = self.setup.view.map_or(0, |view| view as u16);
         if self.shaded.optional.is_empty() {
             return;
         }
         let optional = self.optional(current.provoking);
-        let layer = optional.layer.min(self.setup.layers.saturating_sub(1));
-        current.layer = layer.min(u16::MAX.into()) as u16;
+        if self.setup.view.is_none() {
+            let layer = optional.layer.min(self.setup.layers.saturating_sub(1));
+            current.layer = layer.min(u16::MAX.into()) as u16;
+        }
         if (optional.viewport as usize) < self.setup.transforms.len() {
             current.viewport = optional.viewport as u8;
         }

@@ -108,7 +108,7 @@ impl Transform {
         clip_depth: true,
     };
 
-    pub(super) fn new(viewport: &Viewport, depth_clamp: bool) -> Self {
+    pub(super) fn new(viewport: &Viewport, clip_depth: bool) -> Self {
         let (half_width, half_height) = (0.5 * viewport.width, 0.5 * viewport.height);
         Self {
             scale: [
@@ -121,7 +121,7 @@ impl Transform {
                 half_height + viewport.y,
                 viewport.min_depth,
             ],
-            clip_depth: !depth_clamp,
+            clip_depth,
         }
     }
 

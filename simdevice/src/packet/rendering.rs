@@ -47,6 +47,9 @@ pub struct Rendering {
     pub area: Rect,
     /// How many layers of each attachment are rendered.
     pub layer_count: u32,
+    /// The layers that are views, a bit each: every draw is for all of them and for no other layer, which the pass leaves
+    /// alone. Without any, draws say their layers.
+    pub view_mask: u32,
     /// Colour attachments by location; unused ones are `None`.
     pub color: Vec<Option<Attachment>>,
     /// The depth attachment.

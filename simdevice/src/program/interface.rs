@@ -81,6 +81,8 @@ pub enum VertexInput {
     BaseInstance,
     /// [`Draw::draw_index`].
     DrawIndex,
+    /// The view that is drawn, which is its layer; 0 without views.
+    ViewIndex,
 }
 
 /// What a vertex program's output is.

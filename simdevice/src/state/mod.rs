@@ -281,6 +281,8 @@ pub struct DrawState {
     pub scissors: Vec<Rect>,
     /// Depth is clamped to the viewport's range, and primitives are not clipped at the near and far planes.
     pub depth_clamp: bool,
+    /// Whether primitives are clipped at the near and far planes, if that doesn't follow from `depth_clamp`.
+    pub depth_clip: Option<bool>,
     /// Nothing is rasterized.
     pub rasterizer_discard: bool,
     /// What of polygons is drawn.
@@ -339,6 +341,7 @@ impl DrawState {
                 height,
             }],
             depth_clamp: false,
+            depth_clip: None,
             rasterizer_discard: false,
             polygon_mode: PolygonMode::Fill,
             cull_front: false,

@@ -261,7 +261,7 @@ fn scale_lod(
 /// Half the base-2 logarithm, to 2e-6, and exact for powers of four; -64 or so for zero, 64 for infinity and NaN. Not of
 /// negative numbers.
 #[inline(always)]
-fn half_log2(x: f32) -> f32 {
+pub(super) fn half_log2(x: f32) -> f32 {
     // The mantissa is taken in [sqrt(1/2), sqrt(2)): less the bits of sqrt(1/2), the exponent field tells.
     const BIAS: i32 = 127 << 23;
     let bits = x.min(f32::MAX).to_bits() as i32;

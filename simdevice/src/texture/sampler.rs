@@ -61,8 +61,19 @@ impl BorderColor {
     }
 }
 
-/// A sampler. Anisotropic filtering is not done: such a sampler is read as an isotropic one, which minifies along the
-/// longer axis of a pixel's footprint.
+/// What becomes of the texels that a filter takes together.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Reduction {
+    /// Their weighted mean.
+    #[default]
+    WeightedAverage,
+    /// The least of those that have a weight, component by component.
+    Min,
+    /// The greatest of those that have a weight, component by component.
+    Max,
+}
+
+/// A sampler.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sampler {
     /// Where an image is magnified: the level of detail is zero or less.
@@ -85,6 +96,10 @@ pub struct Sampler {
     pub border_color: BorderColor,
     /// Coordinates count texels of the view's first level, the only one that is read.
     pub unnormalized_coordinates: bool,
+    /// The most samples along a pixel's footprint; at 1 filtering is isotropic.
+    pub max_anisotropy: f32,
+    /// What becomes of the texels that are filtered together.
+    pub reduction: Reduction,
 }
 
 impl Default for Sampler {
@@ -100,6 +115,8 @@ impl Default for Sampler {
             compare_op: None,
             border_color: BorderColor::default(),
             unnormalized_coordinates: false,
+            max_anisotropy: 1.0,
+            reduction: Reduction::default(),
         }
     }
 }

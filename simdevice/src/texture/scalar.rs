@@ -5,7 +5,7 @@
 use super::addressing::{self, Taps};
 use super::cube;
 use super::lod;
-use super::sampler::{AddressMode, BorderColor, Filter, Sampler};
+use super::sampler::{AddressMode, BorderColor, Filter, Reduction, Sampler};
 use super::surface::{Surface, Texel};
 use crate::format::{Channel, Numeric};
 use isa::exec::combine;
@@ -50,7 +50,7 @@ pub(super) fn sample(surface: &Surface, sampler: &Sampler, request: &SampleReque
             if weight > 0.0 {
                 reader.level = selection.low[lane] as usize;
                 let low = reader.footprint(request, lane, filter).filter(&reader);
-                texel = mix(texel, low, weight);
+                texel = mix(sampler.reduction, texel, low, weight);
             }
             surface.swizzled(texel)
         };
@@ -201,8 +201,13 @@ impl Reader<'_> {
             return texel(texels[0]);
         }
         let [a, b, c] = texels.map(|place| texel(place).map(f32::from_bits));
+        let reduce: fn([f32; 3]) -> f32 = match self.sampler.reduction {
+            Reduction::WeightedAverage => |[a, b, c]| (a + b + c) / 3.0,
+            Reduction::Min => |[a, b, c]| a.min(b).min(c),
+            Reduction::Max => |[a, b, c]| a.max(b).max(c),
+        };
         std::array::from_fn(|component| {
-            ((a[component] + b[component] + c[component]) / 3.0).to_bits()
+            reduce([a[component], b[component], c[component]]).to_bits()
         })
     }
 }
@@ -210,16 +215,17 @@ impl Reader<'_> {
 impl Footprint {
     /// The weighted mean.
     fn filter(&self, reader: &Reader<'_>) -> [u32; 4] {
+        let reduction = reader.sampler.reduction;
         match self {
             Self::Grid { axes, filters } => {
                 let [x, y, z] = axes;
                 let row = |j: usize, k: usize| {
                     let texel =
                         |i: usize| reader.texel([x.index[i], y.index[j], z.index[k]], reader.layer);
-                    along(filters[0], x.weight, texel)
+                    along(reduction, filters[0], x.weight, texel)
                 };
-                let slice = |k: usize| along(filters[1], y.weight, |j| row(j, k));
-                along(filters[2], z.weight, slice)
+                let slice = |k: usize| along(reduction, filters[1], y.weight, |j| row(j, k));
+                along(reduction, filters[2], z.weight, slice)
             }
             Self::Cube {
                 face,
@@ -228,11 +234,11 @@ impl Footprint {
                 filter: Filter::Linear,
             } => {
                 let row = |dj: usize| {
-                    along(Filter::Linear, weights[0], |di| {
+                    along(reduction, Filter::Linear, weights[0], |di| {
                         reader.cube_texel(*face, [i + di as i32, j + dj as i32])
                     })
                 };
-                along(Filter::Linear, weights[1], row)
+                along(reduction, Filter::Linear, weights[1], row)
             }
             Self::Cube { face, first, .. } => {
                 let last = reader.surface.levels[reader.level].extent[0] as i32 - 1;
@@ -261,19 +267,35 @@ impl Footprint {
 }
 
 /// Mixes two texels along an axis, or takes the first.
-fn along(filter: Filter, weight: f32, texel: impl Fn(usize) -> [u32; 4]) -> [u32; 4] {
+fn along(
+    reduction: Reduction,
+    filter: Filter,
+    weight: f32,
+    texel: impl Fn(usize) -> [u32; 4],
+) -> [u32; 4] {
     match filter {
         Filter::Nearest => texel(0),
-        Filter::Linear => mix(texel(0), texel(1), weight),
+        Filter::Linear => mix(reduction, texel(0), texel(1), weight),
     }
 }
 
-/// The weighted mean of two texels.
-fn mix(a: [u32; 4], b: [u32; 4], weight: f32) -> [u32; 4] {
-    std::array::from_fn(|component| {
-        let (a, b) = (f32::from_bits(a[component]), f32::from_bits(b[component]));
-        (a + weight * (b - a)).to_bits()
-    })
+/// The weighted mean of two texels, or the least or the greatest of those that have a weight.
+fn mix(reduction: Reduction, a: [u32; 4], b: [u32; 4], weight: f32) -> [u32; 4] {
+    let pairs = |reduce: fn(f32, f32) -> f32| {
+        std::array::from_fn(|component| {
+            let (a, b) = (f32::from_bits(a[component]), f32::from_bits(b[component]));
+            reduce(a, b).to_bits()
+        })
+    };
+    match reduction {
+        Reduction::WeightedAverage => std::array::from_fn(|component| {
+            let (a, b) = (f32::from_bits(a[component]), f32::from_bits(b[component]));
+            (a + weight * (b - a)).to_bits()
+        }),
+        _ if weight == 0.0 => a,
+        Reduction::Min => pairs(f32::min),
+        Reduction::Max => pairs(f32::max),
+    }
 }
 
 /// The texel that a lane means.
@@ -306,10 +328,10 @@ pub(super) fn read(surface: &Surface, request: &TexelRequest) -> [Lanes; 4] {
     let mut out = [[0; CHUNK_LANES]; 4];
     for lane in lanes(request) {
         let texel = place(request.shape, request, lane);
-        if let Some(texel) = surface.texel(request.level[lane] as usize, texel) {
-            for (out, component) in out.iter_mut().zip(surface.swizzled(texel)) {
-                out[lane] = component;
-            }
+        let texel = surface.texel(request.level[lane] as usize, texel);
+        let texel = texel.unwrap_or_else(|| surface.outside());
+        for (out, component) in out.iter_mut().zip(surface.swizzled(texel)) {
+            out[lane] = component;
         }
     }
     out

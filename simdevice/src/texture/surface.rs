@@ -219,6 +219,16 @@ impl Surface {
         Some(self.format.decode(bytes).map(f32::to_bits))
     }
 
+    /// What is read outside the image: a texel of zeros, with what its format lacks.
+    pub fn outside(&self) -> [u32; 4] {
+        let bytes = [0; MAX_TEXEL_SIZE];
+        let zeros = &bytes[..self.texel_size];
+        match self.format.has(Channel::A) || !self.format.aspects().contains(&Aspect::Color) {
+            true => [0; 4],
+            false => self.format.decode(zeros).map(f32::to_bits),
+        }
+    }
+
     /// What a component that isn't there is, or a swizzle's one.
     pub fn one(&self) -> u32 {
         if self.is_integer() { 1 } else { 1f32.to_bits() }

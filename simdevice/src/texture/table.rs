@@ -3,10 +3,10 @@
 use devmem::dispatch;
 use fearless_simd::Level;
 
-use super::sampler::Sampler;
+use super::sampler::{Reduction, Sampler};
 use super::surface::Surface;
 use super::view::ImageBinding;
-use super::{lod, scalar, vector};
+use super::{anisotropy, lod, scalar, vector};
 use isa::ir::{AtomicOp, Dimension, ImageShape};
 use isa::resources::{ImageUnit, Lanes, SampleRequest, TexelRequest};
 
@@ -54,17 +54,14 @@ impl ImageTable {
         self.surfaces.get(image as usize)?.as_ref()
     }
 
-    fn pair(&self, image: u32, sampler: u32) -> Option<(&Surface, &Sampler)> {
-        let sampler = self.samplers.get(sampler as usize)?.as_ref()?;
-        Some((self.surface(image)?, sampler))
-    }
-}
-
-impl ImageUnit for ImageTable {
-    fn sample(&self, image: u32, sampler: u32, request: &SampleRequest) -> [Lanes; 4] {
-        let Some((surface, sampler)) = self.pair(image, sampler) else {
-            return Default::default();
-        };
+    /// An isotropic sample.
+    #[inline]
+    fn sample_once(
+        &self,
+        surface: &Surface,
+        sampler: &Sampler,
+        request: &SampleRequest,
+    ) -> [Lanes; 4] {
         let batched = if self.batched {
             dispatch!(self.level, simd => {
                 match vector::bilinear(simd, surface, sampler, request) {
@@ -76,6 +73,27 @@ impl ImageUnit for ImageTable {
             None
         };
         batched.unwrap_or_else(|| scalar::sample(surface, sampler, request))
+    }
+
+    fn pair(&self, image: u32, sampler: u32) -> Option<(&Surface, &Sampler)> {
+        let sampler = self.samplers.get(sampler as usize)?.as_ref()?;
+        Some((self.surface(image)?, sampler))
+    }
+}
+
+impl ImageUnit for ImageTable {
+    fn sample(&self, image: u32, sampler: u32, request: &SampleRequest) -> [Lanes; 4] {
+        let Some((surface, sampler)) = self.pair(image, sampler) else {
+            return Default::default();
+        };
+        let once = |request: &SampleRequest| self.sample_once(surface, sampler, request);
+        if sampler.max_anisotropy > 1.0
+            && sampler.reduction == Reduction::WeightedAverage
+            && let Some(found) = anisotropy::sample(surface, sampler, request, once)
+        {
+            return found;
+        }
+        once(request)
     }
 
     fn read(&self, image: u32, request: &TexelRequest) -> [Lanes; 4] {

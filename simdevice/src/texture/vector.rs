@@ -14,7 +14,7 @@ use fearless_simd::{Simd, f32x4, f32x16, prelude::*, u32x4, u32x16};
 use super::addressing::{self, Axis, axis, taps};
 use super::cube;
 use super::lod::{self, QUADS, Selection};
-use super::sampler::{AddressMode, Filter, Sampler};
+use super::sampler::{AddressMode, Filter, Reduction, Sampler};
 use super::scalar::{border_texel, reference_value};
 use super::surface::Surface;
 use super::texels::{
@@ -50,7 +50,12 @@ pub(super) fn general<S: Simd>(
 ) -> Option<[Lanes; 4]> {
     let layout = surface.layout.as_ref()?;
     let shape = request.shape;
-    if shape.multisampled || shape.dimension == Dimension::Buffer || request.gather.is_some() {
+    let is_mean = sampler.reduction == Reduction::WeightedAverage;
+    if shape.multisampled
+        || shape.dimension == Dimension::Buffer
+        || request.gather.is_some()
+        || !is_mean
+    {
         return None;
     }
     let reference = sampler.compare_op.zip(request.compare).map(|(op, bits)| {
@@ -447,6 +452,7 @@ fn is_plain(sampler: &Sampler, request: &SampleRequest) -> bool {
         && (request.compare.is_none() || sampler.compare_op.is_none())
         && (sampler.mag_filter, sampler.min_filter) == (Filter::Linear, Filter::Linear)
         && !sampler.unnormalized_coordinates
+        && sampler.reduction == Reduction::WeightedAverage
         && x != AddressMode::ClampToBorder
         && y != AddressMode::ClampToBorder
         && moved == 0

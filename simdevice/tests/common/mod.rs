@@ -78,6 +78,7 @@ pub fn rendering(color: Attachment) -> Rendering {
     Rendering {
         area: EVERYTHING,
         layer_count: 1,
+        view_mask: 0,
         color: vec![Some(color)],
         depth: None,
         stencil: None,

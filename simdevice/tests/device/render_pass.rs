@@ -116,6 +116,7 @@ fn render(config: &Config, format: Format, load: LoadOp, barriers: u32) -> (Vec<
     let rendering = Rendering {
         area: rect(3, 2, 140, 90),
         layer_count: 1,
+        view_mask: 0,
         color: images
             .color
             .iter()
@@ -374,6 +375,7 @@ fn clears_reach_the_layers_and_attachments_that_they_name() {
     let pass = Rendering {
         area: EVERYTHING,
         layer_count: 3,
+        view_mask: 0,
         color: vec![None, Some(attachment(&color, LoadOp::Load))],
         depth: Some(attachment(
             &depth,

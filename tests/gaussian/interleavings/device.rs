@@ -463,6 +463,7 @@ fn begin_pass(resources: &Resources, clear: Option<([f32; 4], f32)>) -> Packet {
     Packet::BeginRendering(Box::new(Rendering {
         area: WHOLE,
         layer_count: 1,
+        view_mask: 0,
         color: vec![attachment(&resources.color, color)],
         depth: attachment(&resources.depth, depth),
         stencil: None,

@@ -366,6 +366,7 @@ impl Case<'_> {
         let mut packets = vec![Packet::BeginRendering(Box::new(Rendering {
             area: everything,
             layer_count: 1,
+            view_mask: 0,
             color: std::iter::zip(&colors, &resolved)
                 .map(|(color, to)| {
                     let attachment = attachment(color, ClearValue::Float(self.clear));

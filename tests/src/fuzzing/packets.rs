@@ -329,6 +329,7 @@ fn rendering(bytes: &mut Bytes<'_>, resources: &Resources) -> Option<Packet> {
     Some(Packet::BeginRendering(Box::new(Rendering {
         area,
         layer_count,
+        view_mask: 0,
         color,
         depth,
         stencil,

@@ -1,5 +1,6 @@
 //! A device that draws triangles: this driver's, by either door, or lavapipe's.
 
+use std::ffi::CStr;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use ash::vk;
@@ -57,6 +58,20 @@ impl Gpu {
         })
     }
 
+    /// This driver, linked into the process, with extensions and features of theirs beside those of the core version.
+    ///
+    /// # Errors
+    /// [`OpenError`] names the step that failed.
+    pub fn extended<T: vk::ExtendsDeviceCreateInfo>(
+        extensions: &[&CStr],
+        features: &mut T,
+    ) -> Result<Self, OpenError> {
+        with_settings(&Settings::default(), || {
+            let entry = vulkan_gaurast::entry();
+            Self::open_with(entry, "a device", |_| true, extensions, Some(features))
+        })
+    }
+
     /// This driver, through the loader. The process must have been started with its manifest in
     /// `VK_DRIVER_FILES`.
     ///
@@ -94,6 +109,17 @@ impl Gpu {
         wanted: &'static str,
         is_wanted: impl Fn(vk::DriverId) -> bool,
     ) -> Result<Self, OpenError> {
+        let no_features = None::<&mut vk::PhysicalDeviceFeatures2<'_>>;
+        Self::open_with(entry, wanted, is_wanted, &[], no_features)
+    }
+
+    fn open_with<T: vk::ExtendsDeviceCreateInfo>(
+        entry: ash::Entry,
+        wanted: &'static str,
+        is_wanted: impl Fn(vk::DriverId) -> bool,
+        extensions: &[&CStr],
+        features: Option<&mut T>,
+    ) -> Result<Self, OpenError> {
         let application = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
         let info = vk::InstanceCreateInfo::default().application_info(&application);
         // SAFETY: the create infos are valid, and what is created lives as long as the instance.
@@ -103,7 +129,7 @@ impl Gpu {
                 .map_err(refused("create an instance"))?;
             let found = find(&instance, is_wanted).and_then(|found| {
                 let (physical_device, name) = found.ok_or(OpenError::NoDevice(wanted))?;
-                let device = create_device(&instance, physical_device)?;
+                let device = create_device(&instance, physical_device, extensions, features)?;
                 Ok((physical_device, name, device))
             });
             let (physical_device, name, device) = match found {
@@ -140,6 +166,16 @@ impl Gpu {
     /// The device's functions.
     pub fn device(&self) -> &ash::Device {
         &self.0.device
+    }
+
+    /// The instance's functions.
+    pub fn instance(&self) -> &ash::Instance {
+        &self.0.instance
+    }
+
+    /// The physical device.
+    pub fn physical_device(&self) -> vk::PhysicalDevice {
+        self.0.physical_device
     }
 
     /// The features of Vulkan 1.0, all of which are enabled except robust access.
@@ -231,7 +267,7 @@ fn find(
         // SAFETY: the physical device is the instance's.
         unsafe { instance.get_physical_device_properties2(device, &mut properties) };
         if is_wanted(driver.driver_id) {
-            let text = |text: &std::ffi::CStr| text.to_string_lossy().into_owned();
+            let text = |text: &CStr| text.to_string_lossy().into_owned();
             let name = text(driver.driver_name_as_c_str().unwrap_or_default());
             let version = text(driver.driver_info_as_c_str().unwrap_or_default());
             return Ok(Some((device, format!("{name} {version}"))));
@@ -250,11 +286,13 @@ fn has_gaussians(instance: &ash::Instance, physical_device: vk::PhysicalDevice) 
     extensions.is_ok_and(|extensions| extensions.iter().any(is_it))
 }
 
-/// Creates a device with every core feature that it has except robust access, which costs time; and with all features
-/// of Gaussian draws, if it draws Gaussians.
-fn create_device(
+/// Creates a device with every core feature that it has except robust access, which costs time; with all features
+/// of Gaussian draws, if it draws Gaussians; and with extensions and their features.
+fn create_device<T: vk::ExtendsDeviceCreateInfo>(
     instance: &ash::Instance,
     physical_device: vk::PhysicalDevice,
+    extensions: &[&CStr],
+    extended: Option<&mut T>,
 ) -> Result<ash::Device, OpenError> {
     let queues = [vk::DeviceQueueCreateInfo::default().queue_priorities(&[1.0])];
     let mut vulkan_1_1 = vk::PhysicalDeviceVulkan11Features::default();
@@ -280,17 +318,22 @@ fn create_device(
         vulkan_1_3.p_next = std::ptr::null_mut();
         gaussian.p_next = std::ptr::null_mut();
         vulkan_1_3.robust_image_access = vk::FALSE;
-        let names = [gaussian_primitive_topology::NAME.as_ptr()];
+        let mut names: Vec<_> = extensions.iter().map(|name| name.as_ptr()).collect();
+        if has_gaussians {
+            names.push(gaussian_primitive_topology::NAME.as_ptr());
+        }
         let mut info = vk::DeviceCreateInfo::default()
             .queue_create_infos(&queues)
             .enabled_features(&core)
             .push_next(&mut vulkan_1_1)
             .push_next(&mut vulkan_1_2)
             .push_next(&mut vulkan_1_3);
+        info = info.enabled_extension_names(&names);
         if has_gaussians {
-            info = info
-                .enabled_extension_names(&names)
-                .push_next(&mut gaussian);
+            info = info.push_next(&mut gaussian);
+        }
+        if let Some(extended) = extended {
+            info = info.push_next(extended);
         }
         instance
             .create_device(physical_device, &info, None)

@@ -27,8 +27,8 @@ pub use expected::{Exception, Expected};
 pub use gpu::{Gpu, OpenError, Recorded};
 pub use output::{Output, Picture, texel_size};
 pub use pipeline::{
-    Bindings, FRAGMENT, Pipeline, PipelineOptions, Resource, VERTEX, Vertex, attribute, binding,
-    blend, depth_test, opaque,
+    Bindings, FRAGMENT, Kernel, Pipeline, PipelineOptions, Resource, VERTEX, Vertex, attribute,
+    binding, blend, depth_test, opaque,
 };
 pub use resource::{Buffer, Image, ImageOptions, Sampler, aspects, range};
 pub use scenes::{Drawn, Missing, Scene};

@@ -70,6 +70,8 @@ pub struct PipelineOptions<'a> {
     pub bindings: Option<&'a Bindings>,
     /// A render pass object and subpass instead of dynamic rendering.
     pub subpass: Option<(vk::RenderPass, u32)>,
+    /// The views of a dynamic render, a bit each.
+    pub view_mask: u32,
 }
 
 impl Default for PipelineOptions<'_> {
@@ -97,6 +99,7 @@ impl Default for PipelineOptions<'_> {
             dynamic: Vec::new(),
             bindings: None,
             subpass: None,
+            view_mask: 0,
         }
     }
 }
@@ -239,6 +242,7 @@ impl Pipeline {
         let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic);
         let (colors, depth, stencil) = target.formats();
         let mut rendering = vk::PipelineRenderingCreateInfo::default()
+            .view_mask(options.view_mask)
             .color_attachment_formats(colors)
             .depth_attachment_format(depth)
             .stencil_attachment_format(stencil);
@@ -264,6 +268,99 @@ impl Pipeline {
         created
             .map(|pipelines| pipelines[0])
             .map_err(|(_, result)| result)
+    }
+}
+
+/// A compute pipeline.
+pub struct Kernel {
+    /// The pipeline.
+    pub raw: vk::Pipeline,
+    /// Its layout: one descriptor set, if any.
+    pub layout: vk::PipelineLayout,
+    gpu: Gpu,
+}
+
+impl Kernel {
+    /// Creates a pipeline of a compute shader over one set.
+    ///
+    /// # Panics
+    /// If the driver refuses it.
+    pub fn new(gpu: &Gpu, source: &str, bindings: &Bindings) -> Self {
+        Self::over(gpu, &compile(Stage::Compute, source), &[bindings.layout])
+    }
+
+    /// Creates a pipeline of a compute shader's SPIR-V over sets of these layouts.
+    ///
+    /// # Panics
+    /// If the driver refuses it.
+    pub fn over(gpu: &Gpu, words: &[u32], sets: &[vk::DescriptorSetLayout]) -> Self {
+        let ranges = [vk::PushConstantRange::default()
+            .stage_flags(vk::ShaderStageFlags::COMPUTE)
+            .size(128)];
+        let info = vk::PipelineLayoutCreateInfo::default()
+            .set_layouts(sets)
+            .push_constant_ranges(&ranges);
+        let device = gpu.device();
+        // SAFETY: see `triangles`.
+        unsafe {
+            let module = vk::ShaderModuleCreateInfo::default().code(words);
+            let module = device
+                .create_shader_module(&module, None)
+                .expect("a shader module");
+            let layout = device
+                .create_pipeline_layout(&info, None)
+                .expect("a pipeline layout");
+            let stage = vk::PipelineShaderStageCreateInfo::default()
+                .stage(vk::ShaderStageFlags::COMPUTE)
+                .module(module)
+                .name(c"main");
+            let info = vk::ComputePipelineCreateInfo::default()
+                .stage(stage)
+                .layout(layout);
+            let created = device.create_compute_pipelines(vk::PipelineCache::null(), &[info], None);
+            device.destroy_shader_module(module, None);
+            Self {
+                raw: created.map_err(|(_, result)| result).expect("a pipeline")[0],
+                layout,
+                gpu: gpu.clone(),
+            }
+        }
+    }
+
+    /// Dispatches workgroups over sets, and waits.
+    pub fn run(&self, sets: &[vk::DescriptorSet], push: &[u32], [x, y, z]: [u32; 3]) {
+        let device = self.gpu.device();
+        let point = vk::PipelineBindPoint::COMPUTE;
+        self.gpu.run(|commands| {
+            commands.barrier();
+            // SAFETY: see `triangles`.
+            unsafe {
+                device.cmd_bind_pipeline(commands.raw, point, self.raw);
+                if !sets.is_empty() {
+                    device.cmd_bind_descriptor_sets(commands.raw, point, self.layout, 0, sets, &[]);
+                }
+                if !push.is_empty() {
+                    let (stage, bytes) = (
+                        vk::ShaderStageFlags::COMPUTE,
+                        bytemuck::cast_slice::<u32, u8>(push),
+                    );
+                    device.cmd_push_constants(commands.raw, self.layout, stage, 0, bytes);
+                }
+                device.cmd_dispatch(commands.raw, x, y, z);
+            }
+            commands.barrier();
+        });
+    }
+}
+
+impl Drop for Kernel {
+    fn drop(&mut self) {
+        let device = self.gpu.device();
+        // SAFETY: see `triangles`.
+        unsafe {
+            device.destroy_pipeline(self.raw, None);
+            device.destroy_pipeline_layout(self.layout, None);
+        }
     }
 }
 
@@ -321,6 +418,10 @@ pub enum Resource {
     Texture(vk::ImageView, vk::Sampler),
     /// An attachment of the same pass.
     Input(vk::ImageView),
+    /// An image that programs write to.
+    StorageImage(vk::ImageView),
+    /// The texels of a buffer.
+    Texels(vk::BufferView),
 }
 
 impl Resource {
@@ -331,13 +432,19 @@ impl Resource {
             Self::Storage(_) => vk::DescriptorType::STORAGE_BUFFER,
             Self::Texture(..) => vk::DescriptorType::COMBINED_IMAGE_SAMPLER,
             Self::Input(_) => vk::DescriptorType::INPUT_ATTACHMENT,
+            Self::StorageImage(_) => vk::DescriptorType::STORAGE_IMAGE,
+            Self::Texels(_) => vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
         }
     }
 
     fn stages(&self) -> vk::ShaderStageFlags {
         match self {
             Self::Input(_) => vk::ShaderStageFlags::FRAGMENT,
-            _ => vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT,
+            _ => {
+                vk::ShaderStageFlags::VERTEX
+                    | vk::ShaderStageFlags::FRAGMENT
+                    | vk::ShaderStageFlags::COMPUTE
+            }
         }
     }
 }
@@ -427,7 +534,10 @@ impl Bindings {
             }
             Resource::DynamicUniform(raw, range) => update(write.buffer_info(&buffer(raw, range))),
             Resource::Texture(view, sampler) => update(write.image_info(&image(view, sampler))),
-            Resource::Input(view) => update(write.image_info(&image(view, vk::Sampler::null()))),
+            Resource::Input(view) | Resource::StorageImage(view) => {
+                update(write.image_info(&image(view, vk::Sampler::null())));
+            }
+            Resource::Texels(view) => update(write.texel_buffer_view(&[view])),
         }
     }
 }

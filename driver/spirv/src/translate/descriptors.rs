@@ -11,7 +11,7 @@ use crate::interface::{DescriptorKind, ImageUse, ShaderBinding};
 use crate::types::{ImageType, Type};
 
 /// The most descriptors that a shader may be bound to.
-const MAX_DESCRIPTORS: u32 = 1 << 20;
+const MAX_DESCRIPTORS: u32 = 1 << 24;
 
 /// Gives a descriptor variable its resource slots.
 pub fn descriptor(t: &mut Translator, id: u32, variable: GlobalVariable) -> Result<Binding> {

@@ -282,8 +282,10 @@ fn lod(
 fn read_image(t: &mut Translator, it: &Instruction) -> Result<()> {
     let (image, image_type) = image_operand(t, it.id(0)?)?;
     let shape = image_type.shape()?;
-    let mut coordinate = coordinate(t, it.id(1)?, shape.coordinates())?;
-    if image_type.dim == Dim::DimSubpassData {
+    let is_input = image_type.dim == Dim::DimSubpassData;
+    let count = if is_input { 2 } else { shape.coordinates() };
+    let mut coordinate = coordinate(t, it.id(1)?, count)?;
+    if is_input {
         coordinate = pixel(t, &coordinate)?;
     }
     let image_operands = image_operands(t, it, 2)?;
@@ -306,15 +308,15 @@ fn read_image(t: &mut Translator, it: &Instruction) -> Result<()> {
     define_texel(t, it, dst.into_iter().flatten())
 }
 
-/// The pixel being shaded, moved by an offset: where an input attachment is read.
+/// The pixel being shaded, moved by an offset, and its layer: where an input attachment is read.
 fn pixel(t: &mut Translator, offset: &[Reg]) -> Result<Vec<Reg>> {
-    let mut coordinate = Vec::with_capacity(offset.len());
+    let mut coordinate = Vec::with_capacity(3);
     for (axis, offset) in (0..2).zip(offset) {
         let position = t.io.frag_coord(&mut t.emit, axis)?;
         let pixel = t.emit.op(Ir::FToS, &[position]);
         coordinate.push(t.emit.op(Ir::IAdd, &[pixel, *offset]));
     }
-    coordinate.extend_from_slice(offset.get(2..).unwrap_or_default());
+    coordinate.push(t.io.layer(&mut t.emit));
     Ok(coordinate)
 }
 

@@ -278,6 +278,11 @@ impl<'a> InputsOutputs<'a> {
         ))
     }
 
+    /// The layer that a fragment is in.
+    pub fn layer(&mut self, emit: &mut Emitter) -> Reg {
+        self.built_in_input(emit, BuiltIn::Layer, 0, ScalarType::Int { width: 32 })
+    }
+
     /// The register of a scalar of an input variable.
     pub fn input_scalar(
         &mut self,

@@ -225,6 +225,7 @@ fn empty_interface(stage: Stage) -> Interface {
         discards: false,
         per_sample: false,
         has_side_effects: false,
+        uses_addresses: false,
     }
 }
 
@@ -315,6 +316,7 @@ pub fn is_supported(capability: Capability) -> bool {
             | C::InterpolationFunction
             | C::StorageImageReadWithoutFormat
             | C::StorageImageWriteWithoutFormat
+            | C::MultiView
             | C::MultiViewport
             | C::VariablePointers
             | C::VariablePointersStorageBuffer

@@ -48,6 +48,7 @@ pub fn pointer_from_value(t: &mut Translator, ty: u32, regs: &[Reg]) -> Result<P
     };
     match (class, regs) {
         (StorageClass::PhysicalStorageBuffer, [address]) => {
+            t.interface.uses_addresses = true;
             Ok(at(Space::Global, *address, EXPLICIT))
         }
         (StorageClass::StorageBuffer, [slot, bytes]) => {

@@ -85,6 +85,7 @@ fn attachments_are_resolved_aspect_by_aspect() {
             stencil: Some(ResolveMode::Max),
         }),
         input: Vec::new(),
+        view_mask: 0,
     };
     let packet = begun(views.clone(), vec![subpass]).subpass(0).unwrap();
     let found = rendering(packet);

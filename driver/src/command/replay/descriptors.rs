@@ -4,6 +4,7 @@ use super::state::{BoundSets, State};
 use crate::command::BoundSet;
 use crate::descriptor::layout::LayoutBinding;
 use crate::descriptor::set::Descriptor;
+use crate::pipeline::resources::ProgramResources;
 use crate::resource::image::ImageView;
 use gaurast_spirv::{DescriptorKind, ShaderBinding};
 use simdevice::packet::Dispatch;
@@ -17,12 +18,12 @@ use std::sync::Arc;
 #[error("descriptor set {0}, which the pipeline uses, is not bound")]
 pub(crate) struct DescriptorSetNotBound(pub(super) u32);
 
-/// The resources that programs that use `descriptors` are bound to. What a set doesn't hold reads as zero.
+/// The resources as a program that uses `resources` is bound to them. What a set doesn't hold reads as zero.
 ///
 /// # Errors
 /// [`DescriptorSetNotBound`] if a set is missing.
 pub(crate) fn bindings(
-    descriptors: &[ShaderBinding],
+    resources: &ProgramResources,
     sets: &BoundSets,
     push_constants: &[u8],
 ) -> Result<Bindings, DescriptorSetNotBound> {
@@ -30,7 +31,15 @@ pub(crate) fn bindings(
         push_constants: push_constants.to_vec(),
         ..Bindings::default()
     };
-    for used in descriptors {
+    if let Some(addresses) = &resources.addresses {
+        let table = addresses.table();
+        if resources.writes {
+            let written = table.buffers().map(|range| &range.memory);
+            written.for_each(|memory| keep_written(memory, &mut bindings));
+        }
+        bindings.addresses = Some(table);
+    }
+    for used in &resources.descriptors {
         let bound = sets.get(used.set).ok_or(DescriptorSetNotBound(used.set))?;
         if let Some(binding) = bound.set.layout().binding(used.binding) {
             bind(used, bound, binding, &mut bindings);
@@ -42,8 +51,10 @@ pub(crate) fn bindings(
 /// Binds what one variable of a program uses.
 fn bind(used: &ShaderBinding, bound: &BoundSet, binding: &LayoutBinding, bindings: &mut Bindings) {
     let held = bound.set.lock();
-    let count = used.count.min(binding.count) as usize;
-    for (element, descriptor) in held[binding.first..][..count].iter().enumerate() {
+    // A set may have fewer descriptors of its last binding than the layout says.
+    let held = held.get(binding.first..).unwrap_or_default();
+    let count = (used.count.min(binding.count) as usize).min(held.len());
+    for (element, descriptor) in held[..count].iter().enumerate() {
         let slot = used.slot as usize + element;
         let dynamic = binding.first_dynamic.map(|first| first + element);
         let offset = dynamic.and_then(|index| bound.dynamic_offsets.get(index));
@@ -100,12 +111,14 @@ fn image(kind: DescriptorKind, view: &ImageView) -> ImageBinding {
 }
 
 fn mark_written(used: &ShaderBinding, memory: &Arc<Allocation>, bindings: &mut Bindings) {
-    if used.writable
-        && !bindings
-            .written
-            .iter()
-            .any(|known| Arc::ptr_eq(known, memory))
-    {
+    if used.writable {
+        keep_written(memory, bindings);
+    }
+}
+
+fn keep_written(memory: &Arc<Allocation>, bindings: &mut Bindings) {
+    let is_known = |known: &Arc<Allocation>| Arc::ptr_eq(known, memory);
+    if !bindings.written.iter().any(is_known) {
         bindings.written.push(Arc::clone(memory));
     }
 }
@@ -144,7 +157,7 @@ pub(crate) fn dispatch(
         .as_ref()
         .ok_or(DispatchError::Pipeline)?;
     let bindings = bindings(
-        &pipeline.descriptors,
+        &pipeline.resources,
         &state.compute_sets,
         &state.push_constants,
     )?;

@@ -131,14 +131,13 @@ pub(super) fn primitives(
         .attributes
         .iter()
         .map(|source| attribute_stream(state, pipeline, source));
-    let bindings = |descriptors| {
-        descriptors::bindings(descriptors, &state.graphics_sets, &state.push_constants)
-    };
+    let bindings =
+        |resources| descriptors::bindings(resources, &state.graphics_sets, &state.push_constants);
     Ok(Packet::Draw(Box::new(simdevice::packet::Draw {
         pipeline: Arc::clone(&primitives.programs),
         attributes: attributes.collect::<Result<_, _>>()?,
-        vertex_bindings: bindings(&primitives.vertex_descriptors)?,
-        fragment_bindings: bindings(&primitives.fragment_descriptors)?,
+        vertex_bindings: bindings(&primitives.vertex_resources)?,
+        fragment_bindings: bindings(&primitives.fragment_resources)?,
         indices: indices(state, parameters)?,
         first: parameters.first,
         count: parameters.count,

@@ -36,7 +36,7 @@ pub(crate) fn begin(state: &State, gaussian: &GaussianPipeline) -> Result<Vec<Pa
         let (sets, constants) = (&state.graphics_sets, &state.push_constants);
         packets.push(Packet::GaussianFragmentStage(Box::new(GaussianFragmentStage {
             program: Arc::clone(&stage.program),
-            bindings: descriptors::bindings(&stage.descriptors, sets, constants)?,
+            bindings: descriptors::bindings(&stage.resources, sets, constants)?,
             sample_shading: stage.sample_shading,
             alpha_to_coverage: stage.alpha_to_coverage,
             alpha_to_one: stage.alpha_to_one,
@@ -86,7 +86,7 @@ fn shaded(
         .iter()
         .map(|source| attribute_stream(state, pipeline, source));
     let bindings = descriptors::bindings(
-        &projection.descriptors,
+        &projection.resources,
         &state.graphics_sets,
         &state.push_constants,
     )?;

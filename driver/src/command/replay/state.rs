@@ -130,7 +130,7 @@ impl BoundSets {
         let set = match self.get(number).filter(same) {
             Some(bound) => Arc::clone(&bound.set),
             None => {
-                let set = Arc::new(DescriptorSet::new(Arc::clone(layout)));
+                let set = Arc::new(DescriptorSet::new(Arc::clone(layout), 0)?);
                 let bound = BoundSet {
                     set: Arc::clone(&set),
                     dynamic_offsets: Vec::new(),

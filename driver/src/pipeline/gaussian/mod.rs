@@ -139,6 +139,11 @@ impl GaussianPipeline {
                 ),
             ));
         };
+        if info.fragment_output.view_mask != 0 {
+            return Err(Error::FeatureNotPresent(
+                "Gaussians in a pass with views".into(),
+            ));
+        }
         combinations(info, gaussian)?;
         stages(info, gaussian, features)?;
         modes(gaussian, features)?;

@@ -4,6 +4,7 @@ use crate::abi::error::Error;
 use crate::device::Device;
 use crate::pipeline::layout::PipelineLayout;
 use crate::pipeline::link::{self, InterfaceComponent, LiveOutputs, Varyings};
+use crate::pipeline::resources::ProgramResources;
 use crate::pipeline::stages;
 use crate::pipeline::state::{
     AttributeSource, FixedFunctionState, GraphicsState, live_color_outputs, reads_second_source,
@@ -13,9 +14,7 @@ use ash::vk;
 use gaurast::vk::{
     GAUSSIAN_LOCATION_UNUSED_GAURAST, GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
-use gaurast_spirv::{
-    BuiltIn, InputSource, Interface, OutputTarget, ScalarType, ShaderBinding, Stage,
-};
+use gaurast_spirv::{BuiltIn, InputSource, Interface, OutputTarget, ScalarType, Stage};
 use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Rate, Type};
 use simdevice::program::fragment::GaussianFragmentProgram;
@@ -32,8 +31,8 @@ pub(crate) struct VertexProjection {
     pub(crate) programs: Arc<DrawPipeline>,
     /// The sources of its attributes.
     pub(crate) attributes: Vec<AttributeSource>,
-    /// The descriptors that it is bound to.
-    pub(crate) descriptors: Vec<ShaderBinding>,
+    /// The resources that it is bound to.
+    pub(crate) resources: ProgramResources,
 }
 
 impl VertexProjection {
@@ -59,7 +58,7 @@ impl VertexProjection {
         let locations = vertex.interface.locations_read();
         let attributes = stages::attributes(info, &locations)?;
         stages::check_attributes(&vertex.interface, &locations, &attributes)?;
-        let descriptors = vertex.interface.descriptors.clone();
+        let resources = ProgramResources::new(device, &vertex.interface);
         let stream = |location| locations.iter().position(|(read, _)| *read == location);
         let programs = link::link_projection(vertex, stream, &components)?;
         let programs = DrawPipeline::of_gaussians(device.simulated().level(), &programs)
@@ -67,7 +66,7 @@ impl VertexProjection {
         Ok(Self {
             programs: Arc::new(programs),
             attributes,
-            descriptors,
+            resources,
         })
     }
 }
@@ -94,8 +93,8 @@ fn check_order(state: &PipelineGaussianStateCreateInfoGAURAST) -> Result<(), Err
 pub(crate) struct ResolveStage {
     /// The program.
     pub(crate) program: Arc<GaussianFragmentProgram>,
-    /// The descriptors that it is bound to.
-    pub(crate) descriptors: Vec<ShaderBinding>,
+    /// The resources that it is bound to.
+    pub(crate) resources: ProgramResources,
     /// True if every sample is shaded for itself.
     pub(crate) sample_shading: bool,
     /// True if alpha makes coverage.
@@ -124,19 +123,20 @@ impl ResolveStage {
             stages::translate(device, layout(info)?, stage, Stage::Fragment, draw.samples)?;
         let varyings = varyings(state)?;
         check_resolve(&fragment.interface, &varyings)?;
-        let descriptors = fragment.interface.descriptors.clone();
+        let resources = ProgramResources::new(device, &fragment.interface);
         let color = live_color_outputs(info, fixed);
         let live_outputs = LiveOutputs {
             color: &color,
             second_source: info.fragment_output.blend.iter().any(reads_second_source),
             points: false,
+            views: false,
         };
         let programs = link::link_resolve(fragment, &varyings, live_outputs)?;
         let program = GaussianFragmentProgram::new(device.simulated().level(), &programs)
             .map_err(|error| Error::InvalidShader(error.to_string()))?;
         Ok(Some(Self {
             program: Arc::new(program),
-            descriptors,
+            resources,
             sample_shading: draw.sample_shading,
             alpha_to_coverage: draw.alpha_to_coverage,
             alpha_to_one: draw.alpha_to_one,
@@ -180,7 +180,7 @@ impl ResolveStage {
         let program = GaussianFragmentProgram::new(device.simulated().level(), &programs);
         Ok(Self {
             program: Arc::new(program.map_err(|error| invalid(&error))?),
-            descriptors: Vec::new(),
+            resources: ProgramResources::default(),
             sample_shading: false,
             alpha_to_coverage: fixed.draw.alpha_to_coverage,
             alpha_to_one: fixed.draw.alpha_to_one,

@@ -73,6 +73,7 @@ fn macro_tiles_have_what_touches_them_in_order() {
         let surface = Surface {
             area,
             layers: 3,
+            view: None,
             depth: None,
         };
         let mut counters = Counters::default();

@@ -208,6 +208,7 @@ fn a_vertex_program_without_end_is_stopped() {
     let surface = Surface {
         area: EVERYTHING,
         layers: 1,
+        view: None,
         depth: None,
     };
     let mut counters = crate::stats::counters::Counters::default();

@@ -248,6 +248,7 @@ pub fn parts(device: &Device, draw: &Draw) -> (Vec<Found>, Counters) {
     let surface = Surface {
         area: EVERYTHING,
         layers: 4,
+        view: None,
         depth: Some(Format::D32Sfloat),
     };
     let mut counters = Counters::default();

@@ -66,6 +66,8 @@ fn random_sampler(rng: &mut ChaCha8Rng) -> Sampler {
         compare_op: None,
         border_color: BorderColor::float([0.25, 0.5, 0.75, 1.0]),
         unnormalized_coordinates: unnormalized,
+        max_anisotropy: *[1.0, 1.0, 4.0].choose(rng).unwrap(),
+        reduction: Reduction::WeightedAverage,
     }
 }
 

@@ -359,6 +359,7 @@ impl Scene {
         let mut pass = Pass::begin(&Rendering {
             area: WHOLE,
             layer_count: 1,
+            view_mask: 0,
             color: vec![Some(attachment(&color))],
             depth: Some(attachment(&depth)),
             stencil: has_stencil.then(|| attachment(&depth)),

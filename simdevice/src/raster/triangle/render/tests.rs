@@ -301,6 +301,7 @@ fn interpolate(samples: u32, each_shaded: bool, simd: SimdLevel) {
     let rendering = Rendering {
         area: EVERYTHING,
         layer_count: 1,
+        view_mask: 0,
         color: vec![Some(attachment(&target, ClearValue::Float([-9.0; 4])))],
         depth: None,
         stencil: None,
@@ -402,6 +403,7 @@ fn where_each_sample_is_shaded_fragments_are_at_their_sample() {
         let rendering = Rendering {
             area: EVERYTHING,
             layer_count: 1,
+            view_mask: 0,
             color: vec![Some(attachment(&target, ClearValue::Float([-9.0; 4])))],
             depth: None,
             stencil: None,

@@ -37,6 +37,7 @@ fn rendering(color: Vec<Attachment>) -> Rendering {
     Rendering {
         area: EVERYTHING,
         layer_count: 1,
+        view_mask: 0,
         color: color.into_iter().map(Some).collect(),
         depth: None,
         stencil: None,
@@ -148,6 +149,7 @@ fn primitives_go_to_their_layer_and_samples_are_resolved() {
     color_attachment.resolve = Some((resolved.clone(), ResolveMode::Average));
     let pass = Rendering {
         layer_count: 2,
+        view_mask: 0,
         ..rendering(vec![color_attachment])
     };
     let corners = [[0, 0], [9000, 100], [100, 9000]];

@@ -473,6 +473,7 @@ fn render(scene: &Scene, config: &Config) -> Picture {
     let rendering = Rendering {
         area: EVERYTHING,
         layer_count: 1,
+        view_mask: 0,
         color: vec![Some(attachment(&target, color_clear(scene)))],
         depth: depth.as_ref().map(|view| attachment(view, value)),
         stencil: stencil.map(|view| attachment(view, value)),

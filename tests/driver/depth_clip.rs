@@ -1,0 +1,86 @@
+//! Near and far planes that clip, or don't, whether or not depth is clamped.
+
+use ash::vk;
+use gaurast_tests::triangles::{
+    Buffer, Gpu, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex,
+};
+
+use crate::GLSLANG;
+
+/// The depth that a fragment shader sees of a triangle that covers everything at depth `z`; None where it is clipped.
+fn depth_seen(gpu: &Gpu, clamp: bool, clip: Option<bool>, z: f32) -> Option<f32> {
+    let mut state = vk::PipelineRasterizationDepthClipStateCreateInfoEXT::default()
+        .depth_clip_enable(clip.unwrap_or(false));
+    let mut raster = vk::PipelineRasterizationStateCreateInfo::default()
+        .line_width(1.0)
+        .depth_clamp_enable(clamp);
+    if clip.is_some() {
+        raster.p_next = std::ptr::from_mut(&mut state).cast();
+    }
+    let target = Target::new(
+        gpu,
+        &TargetOptions {
+            size: [4, 4],
+            ..TargetOptions::of(vk::Format::R32_SFLOAT)
+        },
+    );
+    let options = PipelineOptions {
+        vertex: "layout(location = 0) in vec4 position;
+                 layout(location = 0) out float depth;
+                 void main() { gl_Position = position; depth = position.z; }",
+        fragment: Some(
+            "layout(location = 0) in float depth;
+             layout(location = 0) out vec4 color;
+             void main() { color = vec4(depth); }",
+        ),
+        raster,
+        ..PipelineOptions::default()
+    };
+    let pipeline = Pipeline::new(gpu, &target, &options);
+    let vertex = |x: f32, y: f32| Vertex {
+        position: [x, y, z, 1.0],
+        color: [0.0; 4],
+    };
+    let vertices = Buffer::of(
+        gpu,
+        &[vertex(-1.0, -1.0), vertex(3.0, -1.0), vertex(-1.0, 3.0)],
+    );
+    let pass = Pass {
+        color: vk::ClearColorValue {
+            float32: [100.0; 4],
+        },
+        ..Pass::default()
+    };
+    gpu.run(|commands| {
+        commands.pass(&target, &pass, || {
+            commands.bind(&pipeline);
+            commands.vertices(&vertices);
+            commands.draw(0..3);
+        });
+    });
+    let found: Vec<f32> =
+        bytemuck::pod_collect_to_vec(&target.colors[0].read(vk::ImageAspectFlags::COLOR, 4));
+    assert!(found.iter().all(|depth| depth == &found[0]), "{found:?}");
+    (found[0] != 100.0).then_some(found[0])
+}
+
+#[gaurast_runner::test(needs = [GLSLANG])]
+fn planes_clip_as_the_pipeline_says() {
+    let mut features =
+        vk::PhysicalDeviceDepthClipEnableFeaturesEXT::default().depth_clip_enable(true);
+    let gpu = Gpu::extended(&[ash::ext::depth_clip_enable::NAME], &mut features).expect("a device");
+    for z in [-0.5, 1.5] {
+        for (clamp, clip, drawn) in [
+            (false, None, false),
+            (true, None, true),
+            (false, Some(true), false),
+            (false, Some(false), true),
+            (true, Some(true), false),
+            (true, Some(false), true),
+        ] {
+            let seen = depth_seen(&gpu, clamp, clip, z);
+            assert_eq!(seen, drawn.then_some(z), "{clamp}, {clip:?}");
+        }
+    }
+    assert_eq!(depth_seen(&gpu, false, Some(true), 0.5), Some(0.5));
+}
