@@ -70,23 +70,24 @@ impl Alphas {
             || {
                 let ceiling = f32x16::splat(simd, thresholds.alpha_ceiling);
                 let mut pixels = Tally::new(simd);
-                let mut items = self.alphas.iter_mut();
-                // Two blocks at a time, so that half as many loops end where nobody can foresee it.
-                for (pair, words) in reaching.as_chunks::<2>().0.iter().enumerate() {
-                    let mut rest = u64::from(words[0]) | u64::from(words[1]) << ROUND;
-                    while rest != 0 {
-                        let bit = rest.trailing_zeros() as usize;
-                        rest &= rest - 1;
-                        let (block, number) = ((2 * pair + bit / ROUND) % BLOCKS, bit % ROUND);
+                let mut items = &mut self.alphas[..];
+                for (block, &reaching) in reaching.iter().enumerate() {
+                    let count = reaching.count_ones() as usize;
+                    let Some((alphas, others)) = items.split_at_mut_checked(count) else {
+                        break;
+                    };
+                    items = others;
+                    let most_fall = f32x16::from_slice(simd, &most_fall[block]);
+                    let mut rest = reaching;
+                    for to in alphas {
+                        let number = rest.trailing_zeros() as usize % ROUND;
+                        rest &= rest.wrapping_sub(1);
                         let fall = round.records[number].falls(simd, block);
-                        let most_fall = f32x16::from_slice(simd, &most_fall[block]);
                         let at = (block, round.looks[number].depth);
                         let reached = reached(simd, DEPTH, at, fall, ranges, most_fall);
                         pixels.add(reached);
                         let alpha = alpha(simd, DEPTH, reached, fall, ceiling);
-                        if let Some(to) = items.next() {
-                            alpha.store_slice(to);
-                        }
+                        alpha.store_slice(to);
                     }
                 }
                 pixels.total()
@@ -224,32 +225,39 @@ fn composite_far_from_floor<S: Simd>(
     true
 }
 
-/// Composites a block's alphas; returns how many pixels refused one.
-#[inline(always)]
+/// Composites a block's alphas; returns how many pixels refused one. A function of its own, so that what goes the quick way
+/// has the registers for itself.
+#[inline(never)]
 fn composite_carefully<S: Simd, const DEPTH: DepthMode>(
     accumulator: &mut Accumulator,
     simd: S,
-    (block, mut reaching, alphas): (usize, u32, &[[f32; BLOCK_PIXELS]]),
+    (block, reaching, alphas): (usize, u32, &[[f32; BLOCK_PIXELS]]),
     round: &StagedRound,
     thresholds: Thresholds,
 ) -> u64 {
-    let thresholds = Thresholds {
-        depth_mode: DEPTH,
-        ..thresholds
-    };
-    let mut pixels = pixels(accumulator, simd, block);
-    let mut refused = Tally::new(simd);
-    for alpha in alphas {
-        let look = &round.looks[reaching.trailing_zeros() as usize % ROUND];
-        reaching &= reaching.wrapping_sub(1);
-        let alpha = f32x16::from_slice(simd, alpha);
-        let (to, look) = ((block, &mut pixels), (look.color, look.depth));
-        let goes_on = composite_one(accumulator, simd, to, alpha, look, thresholds);
-        refused.add_without(alpha.simd_gt(0.0), goes_on);
-    }
-    keep(accumulator, block, pixels);
-    accumulator.find_most_fall(simd, block, thresholds.most_fall);
-    refused.total()
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let thresholds = Thresholds {
+                depth_mode: DEPTH,
+                ..thresholds
+            };
+            let mut reaching = reaching;
+            let mut pixels = pixels(accumulator, simd, block);
+            let mut refused = Tally::new(simd);
+            for alpha in alphas {
+                let look = &round.looks[reaching.trailing_zeros() as usize % ROUND];
+                reaching &= reaching.wrapping_sub(1);
+                let alpha = f32x16::from_slice(simd, alpha);
+                let (to, look) = ((block, &mut pixels), (look.color, look.depth));
+                let goes_on = composite_one(accumulator, simd, to, alpha, look, thresholds);
+                refused.add_without(alpha.simd_gt(0.0), goes_on);
+            }
+            keep(accumulator, block, pixels);
+            accumulator.find_most_fall(simd, block, thresholds.most_fall);
+            refused.total()
+        },
+    )
 }
 
 /// As [`evaluate`], of one steep Gaussian in `blocks`: exponents are formed in binary64.
