@@ -391,8 +391,7 @@ impl Renderer {
         let time = start.elapsed();
         let processor_time = processor.and_then(|start| Some(processor_time()? - start));
 
-        let mut pixels = vec![[0.0; 4]; width as usize * height as usize];
-        target.readback.read(&mut pixels)?;
+        let pixels = (target.readback).read_new(width as usize * height as usize)?;
         let counters = self.query.as_ref().map(CounterQuery::read).transpose()?;
         Ok(Frame {
             picture: Picture {
