@@ -166,7 +166,7 @@ fn find_drawn<S: Simd>(
     if is_flat {
         definite = Bits::first(len);
     }
-    let kept = Bits::first(len);
+    let kept = scratch.kept;
     let seen = kept.and(&beyond_near);
     counters.add(Counter::SkippedNear, kept.without(&seen).count());
     counters.add(Counter::SkippedFar, seen.and(&beyond_far).count());
@@ -415,6 +415,7 @@ mod tests {
                 scratch.depth[at] = depth;
                 scratch.lanes.push(at);
             }
+            scratch.kept = Bits::first(lanes.len());
             let (at, value) = odd;
             let flat = &mut *scratch.flat;
             match at % 4 {
