@@ -1,7 +1,8 @@
 //! Clusters: the Gaussians of a buffer that is drawn again and again, in an order in which neighbours in space are
 //! neighbours in memory. Bounds tell of a whole cluster that no picture needs it; what is left is read in one go.
 //!
-//! They are derived from memory that only the device can write, and never change an image.
+//! They are derived from memory that only the device can write, and never change an image. Those of a large draw are made a
+//! piece with each picture, so that no picture waits for all of them.
 
 use super::attributes::{
     Attributes, CoefficientReader, Fetcher, Group, Harmonics, SourceFingerprint,
@@ -61,33 +62,83 @@ pub(super) fn memory_bytes(append: &GaussianAppend, with_harmonics: bool) -> u64
     clusters(append.count.into()) * cluster as u64 + occluders * occluder as u64
 }
 
-impl Clusters {
-    /// The clusters of what `append` draws, without what its model does to it. It has no indices, and of a model none by vertex.
-    /// 2D Gaussians' third scales are zero.
-    pub(super) fn build(append: &GaussianAppend, is_flat: bool, with_harmonics: bool) -> Self {
-        let order = morton_order(append);
-        let mut clusters = host::with_capacity(order.len().div_ceil(GROUP));
-        order
+/// Draws of so many Gaussians have their clusters made at once. Those of more would make a picture wait for long.
+const AT_ONCE: usize = 64 * 1024;
+
+/// What clusters are made of, the same from the first piece to the last.
+#[derive(Clone, Copy)]
+pub(super) struct ClusterSource<'a> {
+    /// It has no indices, and of a model, which is left out, none by vertex.
+    pub(super) append: &'a GaussianAppend,
+    /// Whether they are 2D Gaussians: their third scales are zero.
+    pub(super) is_flat: bool,
+    pub(super) with_harmonics: bool,
+}
+
+/// Clusters that are made a piece at a time.
+#[derive(Debug, Default)]
+pub(super) struct ClusterBuilder {
+    /// The order in which Gaussians lie in clusters, once it is known.
+    order: Option<Vec<u32>>,
+    clusters: Vec<Cluster>,
+}
+
+impl ClusterBuilder {
+    /// Makes the next piece: the order, or clusters of [`AT_ONCE`] Gaussians, or both, where there are no more than that.
+    /// Returns how many clusters it made.
+    pub(super) fn advance(&mut self, source: ClusterSource<'_>) -> usize {
+        let count = source.append.count as usize;
+        let order = match &self.order {
+            Some(order) => order,
+            None => {
+                let order = self.order.insert(morton_order(source.append));
+                if count > AT_ONCE {
+                    return 0;
+                }
+                order
+            }
+        };
+        let done = self.clusters.len();
+        let rest = order.get(done * GROUP..).unwrap_or_default();
+        let piece = &rest[..rest.len().min(AT_ONCE)];
+        let mut clusters = host::with_capacity(piece.len().div_ceil(GROUP));
+        piece
             .par_chunks(GROUP)
             .map_init(Fetcher::default, |fetcher, numbers| {
-                Cluster::read(append, fetcher, numbers, (is_flat, with_harmonics))
+                Cluster::read(source, fetcher, numbers)
             })
             .collect_into_vec(&mut clusters);
+        host::reserve(&mut self.clusters, count.div_ceil(GROUP) - done);
+        self.clusters.extend(clusters);
+        self.clusters.len() - done
+    }
+
+    /// All clusters, once they are made.
+    pub(super) fn finish(&mut self, source: ClusterSource<'_>) -> Option<Clusters> {
+        let count = source.append.count as usize;
+        if self.clusters.len() < count.div_ceil(GROUP) {
+            return None;
+        }
+        let clusters = std::mem::take(self).clusters;
         let opacities = clusters.iter().map(|cluster| cluster.bounds.opacity);
-        let occluders = occluders(&clusters, max_occluders(order.len()));
-        let occluders = occluders.chunks(GROUP).map(|numbers| {
-            Cluster::read(append, &mut Fetcher::default(), numbers, (is_flat, false))
-        });
-        let harmonics = &append.attributes.spherical_harmonics;
-        Self {
-            harmonics: match with_harmonics {
+        let occluders = occluders(&clusters, max_occluders(count));
+        let shapes = ClusterSource {
+            with_harmonics: false,
+            ..source
+        };
+        let occluders = occluders
+            .chunks(GROUP)
+            .map(|numbers| Cluster::read(shapes, &mut Fetcher::default(), numbers));
+        let harmonics = &source.append.attributes.spherical_harmonics;
+        Some(Clusters {
+            harmonics: match source.with_harmonics {
                 true => harmonics.iter().map(SourceFingerprint::new).collect(),
                 false => Vec::new(),
             },
             opacity: opacities.fold(0.0, f32::max),
             occluders: host::collect(occluders),
             clusters,
-        }
+        })
     }
 }
 
@@ -121,12 +172,12 @@ fn occluders(clusters: &[Cluster], most: usize) -> Vec<u32> {
 }
 
 impl Cluster {
-    fn read(
-        append: &GaussianAppend,
-        fetcher: &mut Fetcher,
-        numbers: &[u32],
-        (is_flat, with_harmonics): (bool, bool),
-    ) -> Self {
+    fn read(source: ClusterSource<'_>, fetcher: &mut Fetcher, numbers: &[u32]) -> Self {
+        let ClusterSource {
+            append,
+            is_flat,
+            with_harmonics,
+        } = source;
         let group = Group::of_cluster(append, append.first_instance, numbers);
         let mut attributes = Attributes::default();
         fetcher.read_own(&append.attributes, &group, &mut attributes);
@@ -232,15 +283,14 @@ fn morton_order(append: &GaussianAppend) -> Vec<u32> {
             },
         );
     let (low, per_cell) = grid(&positions);
-    let code = |position: &[f32; 3]| {
-        [0, 1, 2]
-            .into_iter()
-            .map(|axis| {
-                // What is not a number becomes zero.
-                let cell = (f64::from(position[axis]) - low[axis]) / per_cell;
-                spread(cell.clamp(0.0, f64::from((1u32 << AXIS_BITS) - 1)) as u32) << axis
-            })
-            .sum()
+    let cells = 1.0 / per_cell;
+    let code = |&[x, y, z]: &[f32; 3]| {
+        let cell = |position: f32, axis: usize| {
+            // What is not a number becomes zero.
+            let cell = (f64::from(position) - low[axis]) * cells;
+            spread(cell.clamp(0.0, f64::from((1u32 << AXIS_BITS) - 1)) as u32) << axis
+        };
+        cell(x, 0) | cell(y, 1) | cell(z, 2)
     };
     let mut order: Vec<(u32, u32)> = host::collect(positions.iter().map(code).zip(0..));
     sort::sort_by_key(&mut order);
