@@ -408,7 +408,8 @@ pub(super) fn falls_64<S: Simd>(
     block: usize,
 ) -> f32x16<S> {
     let [a, b, c] = splat.factor;
-    let from_mean = |axis: usize| f64::from(task.corner[axis]) - splat.mean[axis];
+    let from_mean =
+        |axis: usize, block: f64| (f64::from(task.corner[axis]) + block) - splat.mean[axis];
     let opacity = f64x8::splat(simd, splat.log2_opacity.into());
     let half_period = if splat.exceeds_period {
         task.half_period
@@ -417,7 +418,7 @@ pub(super) fn falls_64<S: Simd>(
     };
     let within = f64x8::splat(simd, half_period);
     let nothing = f64x8::splat(simd, 1e3);
-    let middle = [BLOCK_X[block] + from_mean(0), BLOCK_Y[block] + from_mean(1)];
+    let middle = [from_mean(0, BLOCK_X[block]), from_mean(1, BLOCK_Y[block])];
     let fall = |first: usize| {
         let dx = f64x8::from_slice(simd, &LANE_X_64[first..first + 8]) + middle[0];
         let dy = f64x8::from_slice(simd, &LANE_Y_64[first..first + 8]) + middle[1];
