@@ -65,6 +65,11 @@ pub(super) fn memory_bytes(append: &GaussianAppend, with_harmonics: bool) -> u64
 /// Draws of so many Gaussians have their clusters made at once. Those of more would make a picture wait for long.
 const AT_ONCE: usize = 64 * 1024;
 
+/// The Gaussians of a piece of more, of which there are at most eight.
+fn piece_size(count: usize) -> usize {
+    count.div_ceil(8).next_multiple_of(GROUP).max(2 * AT_ONCE)
+}
+
 /// What clusters are made of, the same from the first piece to the last.
 #[derive(Clone, Copy)]
 pub(super) struct ClusterSource<'a> {
@@ -84,7 +89,7 @@ pub(super) struct ClusterBuilder {
 }
 
 impl ClusterBuilder {
-    /// Makes the next piece: the order, or clusters of [`AT_ONCE`] Gaussians, or both, where there are no more than that.
+    /// Makes the next piece: the order, or some clusters; both, where there are no more Gaussians than [`AT_ONCE`].
     /// Returns how many clusters it made.
     pub(super) fn advance(&mut self, source: ClusterSource<'_>) -> usize {
         let count = source.append.count as usize;
@@ -100,7 +105,7 @@ impl ClusterBuilder {
         };
         let done = self.clusters.len();
         let rest = order.get(done * GROUP..).unwrap_or_default();
-        let piece = &rest[..rest.len().min(AT_ONCE)];
+        let piece = &rest[..rest.len().min(piece_size(count))];
         let mut clusters = host::with_capacity(piece.len().div_ceil(GROUP));
         piece
             .par_chunks(GROUP)

@@ -1,9 +1,7 @@
 //! Phase 1 of the tile kernel: what the others need of a round's Gaussians in a tile, and which blocks each may reach.
 
 use super::depth_ranges::DepthRanges;
-use super::grid::{
-    BLOCK_PIXELS, BLOCKS, BLOCKS_ACROSS, BlockMiddles, HALF, LANE_X, LANE_Y, ROUND,
-};
+use super::grid::{BLOCK_PIXELS, BLOCKS, BLOCKS_ACROSS, BlockMiddles, HALF, LANE_X, LANE_Y, ROUND};
 use super::inputs::{DepthMode, NO_DEPTH, TileInputs};
 use crate::gaussian::splat::Splat;
 use crate::stats::optimizations::Optimization;
