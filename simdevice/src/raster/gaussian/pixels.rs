@@ -172,7 +172,7 @@ fn composite_all<S: Simd, const DEPTH: DepthMode>(
                     || DEPTH >= FIND_MEDIAN
                     || !composite_far_from_floor(accumulator, simd, of_block, round, thresholds)
                 {
-                    refused += composite_carefully::<_, DEPTH>(
+                    refused += composite_near_floor::<_, DEPTH>(
                         accumulator,
                         simd,
                         of_block,
@@ -228,36 +228,86 @@ fn composite_far_from_floor<S: Simd>(
 /// Composites a block's alphas; returns how many pixels refused one. A function of its own, so that what goes the quick way
 /// has the registers for itself.
 #[inline(never)]
-fn composite_carefully<S: Simd, const DEPTH: DepthMode>(
+fn composite_near_floor<S: Simd, const DEPTH: DepthMode>(
     accumulator: &mut Accumulator,
     simd: S,
-    (block, reaching, alphas): (usize, u32, &[[f32; BLOCK_PIXELS]]),
+    (block, mut reaching, mut alphas): (usize, u32, &[[f32; BLOCK_PIXELS]]),
     round: &StagedRound,
     thresholds: Thresholds,
 ) -> u64 {
     simd.vectorize(
         #[inline(always)]
         || {
-            let thresholds = Thresholds {
-                depth_mode: DEPTH,
-                ..thresholds
-            };
-            let mut reaching = reaching;
-            let mut pixels = pixels(accumulator, simd, block);
-            let mut refused = Tally::new(simd);
-            for alpha in alphas {
-                let look = &round.looks[reaching.trailing_zeros() as usize % ROUND];
-                reaching &= reaching.wrapping_sub(1);
-                let alpha = f32x16::from_slice(simd, alpha);
-                let (to, look) = ((block, &mut pixels), (look.color, look.depth));
-                let goes_on = composite_one(accumulator, simd, to, alpha, look, thresholds);
-                refused.add_without(alpha.simd_gt(0.0), goes_on);
+            if DEPTH != FIND_REACHED && DEPTH < FIND_MEDIAN {
+                let of_block = (block, &mut reaching, &mut alphas);
+                composite_until_finished(accumulator, simd, of_block, round, thresholds);
+                if alphas.is_empty() {
+                    return 0;
+                }
             }
-            keep(accumulator, block, pixels);
-            accumulator.find_most_fall(simd, block, thresholds.most_fall);
-            refused.total()
+            let of_block = (block, reaching, alphas);
+            composite_carefully::<_, DEPTH>(accumulator, simd, of_block, round, thresholds)
         },
     )
+}
+
+/// Composites the first of a block's alphas, up to one that finishes a pixel, and leaves the others.
+#[inline(always)]
+fn composite_until_finished<S: Simd>(
+    accumulator: &mut Accumulator,
+    simd: S,
+    (block, reaching, alphas): (usize, &mut u32, &mut &[[f32; BLOCK_PIXELS]]),
+    round: &StagedRound,
+    thresholds: Thresholds,
+) {
+    let floor = f32x16::splat(simd, thresholds.transmittance_floor);
+    let mut pixels = pixels(accumulator, simd, block);
+    let before = pixels.transmittance;
+    let signs: i32x16<S> = before.bitcast();
+    // What is finished has alphas of zero: here it has light that stays.
+    let light = f32x16::splat(simd, f32::MAX);
+    pixels.transmittance = signs.simd_lt(0).select(light, before);
+    while let [alpha, rest @ ..] = *alphas {
+        let passed = pixels.pass(f32x16::from_slice(simd, alpha));
+        if passed.rest.simd_lt(floor).any_true() {
+            break;
+        }
+        let look = &round.looks[reaching.trailing_zeros() as usize % ROUND];
+        *reaching &= reaching.wrapping_sub(1);
+        *alphas = rest;
+        pixels.transmittance = passed.rest;
+        pixels.add(simd, passed.weight, look.color);
+    }
+    pixels.transmittance = signs.simd_lt(0).select(before, pixels.transmittance);
+    keep(accumulator, block, pixels);
+}
+
+/// Composites a block's alphas; returns how many pixels refused one.
+#[inline(always)]
+fn composite_carefully<S: Simd, const DEPTH: DepthMode>(
+    accumulator: &mut Accumulator,
+    simd: S,
+    (block, mut reaching, alphas): (usize, u32, &[[f32; BLOCK_PIXELS]]),
+    round: &StagedRound,
+    thresholds: Thresholds,
+) -> u64 {
+    let thresholds = Thresholds {
+        depth_mode: DEPTH,
+        ..thresholds
+    };
+    let mut pixels = pixels(accumulator, simd, block);
+    let mut refused = Tally::new(simd);
+    for alpha in alphas {
+        let look = &round.looks[reaching.trailing_zeros() as usize % ROUND];
+        reaching &= reaching.wrapping_sub(1);
+        let alpha = f32x16::from_slice(simd, alpha);
+        let (to, look) = ((block, &mut pixels), (look.color, look.depth));
+        let goes_on = composite_one(accumulator, simd, to, alpha, look, thresholds);
+        refused.add_without(alpha.simd_gt(0.0), goes_on);
+    }
+    keep(accumulator, block, pixels);
+    accumulator.find_most_fall(simd, block, thresholds.most_fall);
+    refused.total()
 }
 
 /// As [`evaluate`], of one steep Gaussian in `blocks`: exponents are formed in binary64.
