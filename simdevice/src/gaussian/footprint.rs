@@ -57,6 +57,12 @@ impl From<PackedSpan> for TileSpan {
 }
 
 impl PackedSpan {
+    /// The span of such a number.
+    #[inline(always)]
+    pub(super) fn from_bits(bits: u32) -> Self {
+        Self(bits)
+    }
+
     /// Whether it has no tile.
     #[inline(always)]
     pub(crate) fn is_empty(self) -> bool {
