@@ -339,6 +339,100 @@ fn spread(value: u32) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::format::Format;
+    use crate::packet::{AttributeStream, BufferRange, GaussianAttributes, ModelAttributes};
+    use devmem::Allocation;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use std::sync::Arc;
+
+    /// A draw of so many Gaussians at random places.
+    fn append(count: usize) -> GaussianAppend {
+        const FLOATS: usize = 14;
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let floats: Vec<f32> = (0..FLOATS * count).map(|_| rng.random()).collect();
+        let size = 4 * floats.len() as u64;
+        let memory = Allocation::new(size, false).unwrap();
+        memory.write(0, &floats).unwrap();
+        let stream = |float: u32, format| AttributeStream {
+            buffer: BufferRange {
+                memory: Arc::clone(&memory),
+                offset: 0,
+                size,
+            },
+            stride: 4 * FLOATS as u32,
+            offset: 4 * float,
+            format,
+            instance_divisor: None,
+        };
+        GaussianAppend {
+            attributes: GaussianAttributes {
+                position: stream(0, Format::R32G32B32Sfloat),
+                scale: stream(3, Format::R32G32B32Sfloat),
+                rotation: stream(6, Format::R32G32B32A32Sfloat),
+                opacity: stream(10, Format::R32Sfloat),
+                model: ModelAttributes::default(),
+                spherical_harmonics: vec![stream(11, Format::R32G32B32Sfloat)],
+            },
+            indices: None,
+            first: 0,
+            count: count as u32,
+            first_instance: 0,
+            instance_count: 1,
+        }
+    }
+
+    /// What each piece made, and all clusters.
+    fn pieces(append: &GaussianAppend) -> (Vec<usize>, Clusters) {
+        let source = ClusterSource {
+            append,
+            is_flat: false,
+            with_harmonics: true,
+        };
+        let (mut builder, mut made) = (ClusterBuilder::default(), Vec::new());
+        loop {
+            made.push(builder.advance(source));
+            if let Some(clusters) = builder.finish(source) {
+                return (made, clusters);
+            }
+        }
+    }
+
+    #[test]
+    fn pieces_make_a_cluster_of_every_gaussian() {
+        for (count, expected) in [
+            (700, vec![3]),
+            (AT_ONCE, vec![AT_ONCE / GROUP]),
+            (140_000, vec![0, 512, 35]),
+        ] {
+            let append = append(count);
+            let (made, clusters) = pieces(&append);
+            assert_eq!(made, expected);
+            let numbers = clusters.clusters.iter().flat_map(|own| &own.numbers);
+            let mut numbers: Vec<u32> = numbers.copied().collect();
+            assert_eq!(numbers, morton_order(&append));
+            numbers.sort_unstable();
+            assert!(numbers.into_iter().eq(0..count as u32));
+            for cluster in &clusters.clusters {
+                let number = u64::from(cluster.numbers[0]);
+                let memory = &append.attributes.position.buffer.memory;
+                let mut floats = [0.0f32; 14];
+                memory.read(number * 56, &mut floats).unwrap();
+                let position = cluster.attributes.position.each_ref().map(|x| x[0]);
+                assert_eq!(position, floats[..3]);
+                assert_eq!(cluster.attributes.opacity[0], floats[10]);
+                assert_eq!(cluster.harmonics().from(0)[..3], floats[11..]);
+            }
+        }
+    }
+
+    #[test]
+    fn pieces_are_eight_at_most() {
+        for count in [AT_ONCE + 1, 1_000_000, 6_000_001] {
+            assert!(count.div_ceil(piece_size(count)) <= 8, "{count}");
+            assert_eq!(piece_size(count) % GROUP, 0);
+        }
+    }
 
     #[test]
     fn bits_are_spread() {

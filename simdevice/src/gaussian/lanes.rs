@@ -44,14 +44,6 @@ impl Bits {
         self.0[at / 64 % WORDS] |= mask.to_bitmask() << (at % 64);
     }
 
-    /// Makes the lanes of `mask`, whose first is lane `at`, a multiple of the mask's width, those that it tells.
-    #[inline(always)]
-    pub(super) fn replace<S: Simd, M: SimdMask<S>>(&mut self, at: usize, mask: M) {
-        let all = (u64::MAX >> (64 - M::LEN)) << (at % 64);
-        let word = &mut self.0[at / 64 % WORDS];
-        *word = *word & !all | mask.to_bitmask() << (at % 64);
-    }
-
     /// Whether a lane is among them.
     #[inline(always)]
     pub(super) fn has(&self, lane: usize) -> bool {

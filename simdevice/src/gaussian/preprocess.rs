@@ -54,6 +54,12 @@ impl Source<'_> {
     #[inline(always)]
     fn prefetch_harmonics(&self, degree: u32, lanes: &[usize], kept: u64) {
         let count = coefficient_count(degree);
+        if let [first, .., last] = *lanes
+            && last - first == lanes.len() - 1
+            && let Some(floats) = self.harmonics.of_all(first..=last, 3 * count)
+        {
+            return devmem::prefetch(floats);
+        }
         for (number, &lane) in lanes.iter().enumerate() {
             if kept >> number & 1 == 0 {
                 continue;
@@ -336,7 +342,10 @@ pub(super) fn shape<S: Simd>(
     store(factor[0], &mut flat.factor[0]);
     store(factor[1], &mut flat.factor[1]);
     store(factor[2], &mut flat.factor[2]);
-    flat.steep.replace(at, are_steep::<S>(factor, log2_opacity));
+    if at == 0 {
+        flat.steep = Bits::default();
+    }
+    flat.steep.set(at, are_steep::<S>(factor, log2_opacity));
     // The tile engine evaluates the exponent in binary32: a margin wider than its error keeps every
     // pixel that it would accept. What cannot reach the floor even so has a negative extent.
     let room = log2_opacity - view.log2_floor;
@@ -526,22 +535,19 @@ fn append(
     let [keys, sequences] = &*scratch.keys;
     let keys = lanes.iter().map(|one| [keys[one.at], sequences[one.at]]);
     out.keys.extend(keys);
-    let splat = |one: &ColoredLane| {
-        let [red, green, blue, _] = one.color;
-        let depth = center_depth(view, one.at, scratch);
-        Splat::new(&scratch.flat, one.at, [red, green, blue], depth)
-    };
+    let splats = lanes.iter().map(|one| one.splat(view, scratch));
     match view.period {
-        None => out.splats.extend(lanes.iter().map(splat)),
-        Some(period) => out.splats.extend(lanes.iter().map(|one| {
-            let wide = 2.0 * scratch.flat.half[0][one.at] >= period;
-            let splat = splat(one);
-            Splat {
-                needs_f64: wide || splat.needs_f64,
-                exceeds_period: wide,
-                ..splat
-            }
-        })),
+        None => out.splats.extend(splats),
+        Some(period) => out
+            .splats
+            .extend(lanes.iter().zip(splats).map(|(one, splat)| {
+                let wide = 2.0 * scratch.flat.half[0][one.at] >= period;
+                Splat {
+                    needs_f64: wide || splat.needs_f64,
+                    exceeds_period: wide,
+                    ..splat
+                }
+            })),
     }
     let reaches = lanes.iter().map(|one| scratch.reaches.get(one.at));
     out.reaches.extend(reaches);
@@ -563,6 +569,16 @@ struct ColoredLane {
     at: usize,
     /// The fourth number is not one of the colour's.
     color: [f32; 4],
+}
+
+impl ColoredLane {
+    /// What the tile engine needs of it.
+    #[inline(always)]
+    fn splat(&self, view: &ViewConstants, scratch: &Scratch) -> Splat {
+        let [red, green, blue, _] = self.color;
+        let depth = center_depth(view, self.at, scratch);
+        Splat::new(&scratch.flat, self.at, [red, green, blue], depth)
+    }
 }
 
 /// Those of some directions.

@@ -183,3 +183,47 @@ impl Scratch {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lanes_that_are_kept_are_the_same_among_others_and_alone() {
+        let mut attributes = Attributes::default();
+        for (lane, (x, opacity)) in (attributes.position[0].iter_mut())
+            .zip(&mut attributes.opacity)
+            .enumerate()
+        {
+            (*x, *opacity) = (lane as f32, 0.5 + lane as f32);
+        }
+        for (len, left_out) in [(GROUP, 5), (GROUP, 3), (200, 5), (200, 3), (GROUP, GROUP)] {
+            let mut kept = Bits::first(len);
+            let out = (0..len).filter(|lane| lane % left_out == left_out - 1);
+            let mut others = Bits::default();
+            out.for_each(|lane| others.set_one(lane, true));
+            if left_out < GROUP {
+                kept = kept.without(&others);
+            }
+            let values = |may_have_others: bool| {
+                let mut scratch = Scratch::new();
+                scratch.gather(&attributes, &kept, len, may_have_others);
+                let mut values = Vec::new();
+                scratch.kept.for_each(|at| {
+                    let (x, opacity) = (scratch.position[0][at], scratch.opacity[at]);
+                    values.push((scratch.lanes[at], x, opacity));
+                });
+                (scratch.lanes.len(), values)
+            };
+            let [(among, of_all), (alone, of_kept)] = [true, false].map(values);
+            assert_eq!(of_all, of_kept);
+            let count = kept.count() as usize;
+            assert_eq!(alone, count);
+            assert_eq!(among, if 4 * count >= 3 * len { len } else { count });
+            let expected = |lane: usize| (lane, lane as f64, 0.5 + lane as f64);
+            let mut lanes = Vec::new();
+            kept.for_each(|lane| lanes.push(expected(lane)));
+            assert_eq!(of_kept, lanes);
+        }
+    }
+}

@@ -59,10 +59,10 @@ const STEEP_FACTOR: f64 = 8.0;
 /// Which Gaussians' exponents must be formed in binary64. It depends on each Gaussian alone.
 #[inline(always)]
 pub(super) fn are_steep<S: Simd>(factor: [S::f64s; 3], log2_opacity: S::f64s) -> S::mask64s {
+    // The first and the last one are never negative. What is not a number is no greater.
     let [a, b, c] = factor;
-    // What is not a number is not compared.
-    (a.abs().simd_gt(STEEP_FACTOR) | b.abs().simd_gt(STEEP_FACTOR))
-        | (c.abs().simd_gt(STEEP_FACTOR) | log2_opacity.simd_gt(STEEP_LOG2_OPACITY))
+    (a.simd_gt(STEEP_FACTOR) | b.abs().simd_gt(STEEP_FACTOR))
+        | (c.simd_gt(STEEP_FACTOR) | log2_opacity.simd_gt(STEEP_LOG2_OPACITY))
 }
 
 /// The least factor, in 1/px, whose binary16 value is as exact as that of others.
