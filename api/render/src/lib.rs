@@ -474,8 +474,7 @@ impl Renderer {
         let time = start.elapsed();
         let processor_time = processor.and_then(|start| Some(processor_time()? - start));
 
-        let mut pixels = vec![[0.0; 4]; width as usize * height as usize];
-        target.readback.read(&mut pixels)?;
+        let pixels = (target.readback).read_new(width as usize * height as usize)?;
         let depth = match &target.depths {
             None => None,
             Some((_, readback)) => {

@@ -140,6 +140,27 @@ impl Buffer {
         })
     }
 
+    /// A copy of the first `count` elements of the buffer, which must be in host memory and unused by the device.
+    ///
+    /// # Errors
+    /// If the memory cannot be mapped.
+    ///
+    /// # Panics
+    /// If the buffer is smaller.
+    pub fn read_new<T: Pod>(&self, count: usize) -> Result<Vec<T>, RenderError> {
+        let bytes = count * size_of::<T>();
+        assert!(bytes as u64 <= self.size, "the buffer holds the elements");
+        let mut values = Vec::<T>::with_capacity(count);
+        self.mapped(|mapped| {
+            let to = values.as_mut_ptr().cast::<u8>();
+            // SAFETY: `mapped` points to `size` bytes, which nothing else accesses meanwhile, and `to` to room for `bytes`.
+            unsafe { mapped.copy_to_nonoverlapping(to, bytes) }
+        })?;
+        // SAFETY: there is room for them, and every pattern of bits that was copied is one of `T` (`Pod`).
+        unsafe { values.set_len(count) };
+        Ok(values)
+    }
+
     /// Lets `fill` write the first `count` elements of the buffer, which must be in host memory and
     /// unused by the device.
     ///

@@ -5,6 +5,7 @@ use super::spherical_harmonics::{COEFFICIENT_FLOATS, MAX_COEFFICIENTS};
 use crate::format::Format;
 use crate::packet::{AttributeStream, GaussianAppend, GaussianAttributes, IndexStream};
 use devmem::Allocation;
+use std::ops::RangeInclusive;
 use std::sync::{Arc, Weak};
 
 /// Vertex attributes by lane, as they are read.
@@ -352,6 +353,16 @@ impl<'a> Harmonics<'a> {
     #[inline(always)]
     pub(super) fn from(&self, lane: usize) -> &'a [f32] {
         self.floats.get(lane * self.stride..).unwrap_or_default()
+    }
+
+    /// The floats of lanes that follow one another, if they are there, and no lane has more than `most`.
+    #[inline(always)]
+    pub(super) fn of_all(&self, lanes: RangeInclusive<usize>, most: usize) -> Option<&'a [f32]> {
+        let (first, end) = (*lanes.start(), *lanes.end() + 1);
+        let are_there = (1..=most).contains(&self.stride);
+        self.floats
+            .get(first * self.stride..end * self.stride)
+            .filter(|_| are_there)
     }
 }
 

@@ -1,10 +1,11 @@
 //! Which draws have clusters. Those of a draw are made when it is drawn for the second time, since a picture that is drawn
-//! once is drawn faster without them. They live in the memory that they are derived from: when that is freed or written,
+//! once is drawn faster without them; those of a large one from then on, a piece each time, and it has none before all are
+//! there. They live in the memory that they are derived from: when that is freed or written,
 //! they are gone.
 
 use super::attributes::{SourceFingerprint, is_device_local};
 use super::clusters;
-use super::clusters::Clusters;
+use super::clusters::{ClusterBuilder, ClusterSource, Clusters};
 use super::set::GaussianSet;
 use crate::packet::{AttributeStream, GaussianAppend};
 use crate::runtime::Runtime;
@@ -32,6 +33,8 @@ struct Entry {
     used: u64,
     /// Its clusters, if they were made; they belong to the memory of its positions.
     clusters: Weak<Clusters>,
+    /// Those that are being made; they belong there, too.
+    building: Weak<Mutex<ClusterBuilder>>,
     /// Bytes that they take.
     bytes: u64,
 }
@@ -60,6 +63,7 @@ impl Entry {
             is_flat,
             used: 0,
             clusters: Weak::new(),
+            building: Weak::new(),
             bytes: clusters::memory_bytes(append, with_harmonics),
         }
     }
@@ -85,7 +89,7 @@ impl Entry {
 
     /// Bytes that its clusters take.
     fn memory_bytes(&self) -> u64 {
-        match self.clusters.strong_count() {
+        match self.clusters.strong_count() + self.building.strong_count() {
             0 => 0,
             _ => self.bytes,
         }
@@ -97,8 +101,14 @@ impl Entry {
             .streams
             .first()
             .and_then(|positions| positions.memory());
-        if let Some((memory, clusters)) = memory.zip(self.clusters.upgrade()) {
+        let Some(memory) = memory else {
+            return;
+        };
+        if let Some(clusters) = self.clusters.upgrade() {
             memory.drop_derived(&(clusters as _));
+        }
+        if let Some(building) = self.building.upgrade() {
+            memory.drop_derived(&(building as _));
         }
     }
 }
@@ -129,15 +139,14 @@ impl ClusterCache {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The clusters of what `append` draws, as 2D Gaussians if `is_flat`, if it has any; `build` makes them, with spherical
-    /// harmonics or without. Draws of the same Gaussians by lower degrees share them. All clusters together take at most
-    /// `budget` bytes.
+    /// The clusters of what `append` draws, as 2D Gaussians if `is_flat`, if it has any; `advance` makes a piece of them. Draws
+    /// of the same Gaussians by lower degrees share them. All clusters together take at most `budget` bytes.
     pub(super) fn get(
         &self,
         append: &GaussianAppend,
         is_flat: bool,
         budget: u64,
-        build: impl FnOnce(bool) -> Clusters,
+        advance: impl FnOnce(&mut ClusterBuilder, ClusterSource<'_>) -> Option<Clusters>,
     ) -> Option<Arc<Clusters>> {
         if !is_eligible(append) || clusters::memory_bytes(append, false) > budget {
             return None;
@@ -146,7 +155,8 @@ impl ClusterCache {
             && clusters::memory_bytes(append, true) <= budget;
         // Generations are read before the memory, so that what is written meanwhile makes them old.
         let mut drawn = Entry::new(append, is_flat, with_harmonics);
-        {
+        let memory = &append.attributes.position.buffer.memory;
+        let building = {
             let mut entries = self.lock();
             entries.now += 1;
             drawn.used = entries.now;
@@ -165,26 +175,48 @@ impl ClusterCache {
                     return Some(clusters);
                 }
             }
-            if !entries.entries.iter().any(|entry| entry.is_same(&drawn)) {
+            let Some(entry) = entries.entries.iter().find(|entry| entry.is_same(&drawn)) else {
                 entries.entries.push(drawn);
                 entries.make_room(0, budget);
                 return None;
-            }
+            };
+            let building = entry.building.upgrade().unwrap_or_else(|| {
+                let building = Arc::<Mutex<ClusterBuilder>>::default();
+                memory.keep_derived(Arc::clone(&building) as _);
+                building
+            });
+            drawn.building = Arc::downgrade(&building);
             // What is made now is for the draws of those, too.
             entries.entries.retain(|entry| {
                 let is_covered = drawn.covers(entry);
-                if is_covered {
+                if is_covered && !entry.building.ptr_eq(&drawn.building) {
                     entry.release();
                 }
                 !is_covered
             });
             entries.make_room(drawn.bytes, budget);
+            entries.entries.push(drawn);
+            building
+        };
+        let source = ClusterSource {
+            append,
+            is_flat,
+            with_harmonics,
+        };
+        let clusters = {
+            let mut builder = building.lock().unwrap_or_else(PoisonError::into_inner);
+            Arc::new(advance(&mut builder, source)?)
+        };
+        let mut entries = self.lock();
+        let made_by = Arc::downgrade(&building);
+        let mut entries = entries.entries.iter_mut();
+        // If there was no room for them meanwhile, this is the only draw that they serve.
+        if let Some(entry) = entries.find(|entry| entry.building.ptr_eq(&made_by)) {
+            entry.clusters = Arc::downgrade(&clusters);
+            entry.building = Weak::new();
+            memory.keep_derived(Arc::clone(&clusters) as _);
         }
-        let clusters = Arc::new(build(with_harmonics));
-        drawn.clusters = Arc::downgrade(&clusters);
-        let memory = &append.attributes.position.buffer.memory;
-        memory.keep_derived(Arc::clone(&clusters) as _);
-        self.lock().entries.push(drawn);
+        memory.drop_derived(&(building as _));
         Some(clusters)
     }
 }
@@ -203,14 +235,15 @@ pub(super) fn find(
     }
     let is_flat = set.is_flat();
     for (append, found) in set.appends.iter().zip(&mut found) {
-        let build = |with_harmonics| {
+        let advance = |builder: &mut ClusterBuilder, source: ClusterSource<'_>| {
             let started = Instant::now();
-            let clusters = runtime.install(|| Clusters::build(append, is_flat, with_harmonics));
-            counters.add(Counter::ClustersBuilt, clusters.clusters.len() as u64);
+            let (made, clusters) =
+                runtime.install(|| (builder.advance(source), builder.finish(source)));
+            counters.add(Counter::ClustersBuilt, made as u64);
             counters.add(Counter::ClusterTime, started.elapsed().as_nanos() as u64);
             clusters
         };
-        *found = cache.get(append, is_flat, config.cluster_budget_bytes, build);
+        *found = cache.get(append, is_flat, config.cluster_budget_bytes, advance);
     }
     found
 }

@@ -1,7 +1,8 @@
 //! Clusters: the Gaussians of a buffer that is drawn again and again, in an order in which neighbours in space are
 //! neighbours in memory. Bounds tell of a whole cluster that no picture needs it; what is left is read in one go.
 //!
-//! They are derived from memory that only the device can write, and never change an image.
+//! They are derived from memory that only the device can write, and never change an image. Those of a large draw are made a
+//! piece with each picture, so that no picture waits for all of them.
 
 use super::attributes::{
     Attributes, CoefficientReader, Fetcher, Group, Harmonics, SourceFingerprint,
@@ -61,33 +62,88 @@ pub(super) fn memory_bytes(append: &GaussianAppend, with_harmonics: bool) -> u64
     clusters(append.count.into()) * cluster as u64 + occluders * occluder as u64
 }
 
-impl Clusters {
-    /// The clusters of what `append` draws, without what its model does to it. It has no indices, and of a model none by vertex.
-    /// 2D Gaussians' third scales are zero.
-    pub(super) fn build(append: &GaussianAppend, is_flat: bool, with_harmonics: bool) -> Self {
-        let order = morton_order(append);
-        let mut clusters = host::with_capacity(order.len().div_ceil(GROUP));
-        order
+/// Draws of so many Gaussians have their clusters made at once. Those of more would make a picture wait for long.
+const AT_ONCE: usize = 64 * 1024;
+
+/// The Gaussians of a piece of more, of which there are at most eight.
+fn piece_size(count: usize) -> usize {
+    count.div_ceil(8).next_multiple_of(GROUP).max(2 * AT_ONCE)
+}
+
+/// What clusters are made of, the same from the first piece to the last.
+#[derive(Clone, Copy)]
+pub(super) struct ClusterSource<'a> {
+    /// It has no indices, and of a model, which is left out, none by vertex.
+    pub(super) append: &'a GaussianAppend,
+    /// Whether they are 2D Gaussians: their third scales are zero.
+    pub(super) is_flat: bool,
+    pub(super) with_harmonics: bool,
+}
+
+/// Clusters that are made a piece at a time.
+#[derive(Debug, Default)]
+pub(super) struct ClusterBuilder {
+    /// The order in which Gaussians lie in clusters, once it is known.
+    order: Option<Vec<u32>>,
+    clusters: Vec<Cluster>,
+}
+
+impl ClusterBuilder {
+    /// Makes the next piece: the order, or some clusters; both, where there are no more Gaussians than [`AT_ONCE`].
+    /// Returns how many clusters it made.
+    pub(super) fn advance(&mut self, source: ClusterSource<'_>) -> usize {
+        let count = source.append.count as usize;
+        let order = match &self.order {
+            Some(order) => order,
+            None => {
+                let order = self.order.insert(morton_order(source.append));
+                if count > AT_ONCE {
+                    return 0;
+                }
+                order
+            }
+        };
+        let done = self.clusters.len();
+        let rest = order.get(done * GROUP..).unwrap_or_default();
+        let piece = &rest[..rest.len().min(piece_size(count))];
+        let mut clusters = host::with_capacity(piece.len().div_ceil(GROUP));
+        piece
             .par_chunks(GROUP)
             .map_init(Fetcher::default, |fetcher, numbers| {
-                Cluster::read(append, fetcher, numbers, (is_flat, with_harmonics))
+                Cluster::read(source, fetcher, numbers)
             })
             .collect_into_vec(&mut clusters);
+        host::reserve(&mut self.clusters, count.div_ceil(GROUP) - done);
+        self.clusters.extend(clusters);
+        self.clusters.len() - done
+    }
+
+    /// All clusters, once they are made.
+    pub(super) fn finish(&mut self, source: ClusterSource<'_>) -> Option<Clusters> {
+        let count = source.append.count as usize;
+        if self.clusters.len() < count.div_ceil(GROUP) {
+            return None;
+        }
+        let clusters = std::mem::take(self).clusters;
         let opacities = clusters.iter().map(|cluster| cluster.bounds.opacity);
-        let occluders = occluders(&clusters, max_occluders(order.len()));
-        let occluders = occluders.chunks(GROUP).map(|numbers| {
-            Cluster::read(append, &mut Fetcher::default(), numbers, (is_flat, false))
-        });
-        let harmonics = &append.attributes.spherical_harmonics;
-        Self {
-            harmonics: match with_harmonics {
+        let occluders = occluders(&clusters, max_occluders(count));
+        let shapes = ClusterSource {
+            with_harmonics: false,
+            ..source
+        };
+        let occluders = occluders
+            .chunks(GROUP)
+            .map(|numbers| Cluster::read(shapes, &mut Fetcher::default(), numbers));
+        let harmonics = &source.append.attributes.spherical_harmonics;
+        Some(Clusters {
+            harmonics: match source.with_harmonics {
                 true => harmonics.iter().map(SourceFingerprint::new).collect(),
                 false => Vec::new(),
             },
             opacity: opacities.fold(0.0, f32::max),
             occluders: host::collect(occluders),
             clusters,
-        }
+        })
     }
 }
 
@@ -121,12 +177,12 @@ fn occluders(clusters: &[Cluster], most: usize) -> Vec<u32> {
 }
 
 impl Cluster {
-    fn read(
-        append: &GaussianAppend,
-        fetcher: &mut Fetcher,
-        numbers: &[u32],
-        (is_flat, with_harmonics): (bool, bool),
-    ) -> Self {
+    fn read(source: ClusterSource<'_>, fetcher: &mut Fetcher, numbers: &[u32]) -> Self {
+        let ClusterSource {
+            append,
+            is_flat,
+            with_harmonics,
+        } = source;
         let group = Group::of_cluster(append, append.first_instance, numbers);
         let mut attributes = Attributes::default();
         fetcher.read_own(&append.attributes, &group, &mut attributes);
@@ -232,15 +288,14 @@ fn morton_order(append: &GaussianAppend) -> Vec<u32> {
             },
         );
     let (low, per_cell) = grid(&positions);
-    let code = |position: &[f32; 3]| {
-        [0, 1, 2]
-            .into_iter()
-            .map(|axis| {
-                // What is not a number becomes zero.
-                let cell = (f64::from(position[axis]) - low[axis]) / per_cell;
-                spread(cell.clamp(0.0, f64::from((1u32 << AXIS_BITS) - 1)) as u32) << axis
-            })
-            .sum()
+    let cells = 1.0 / per_cell;
+    let code = |&[x, y, z]: &[f32; 3]| {
+        let cell = |position: f32, axis: usize| {
+            // What is not a number becomes zero.
+            let cell = (f64::from(position) - low[axis]) * cells;
+            spread(cell.clamp(0.0, f64::from((1u32 << AXIS_BITS) - 1)) as u32) << axis
+        };
+        cell(x, 0) | cell(y, 1) | cell(z, 2)
     };
     let mut order: Vec<(u32, u32)> = host::collect(positions.iter().map(code).zip(0..));
     sort::sort_by_key(&mut order);
@@ -284,6 +339,100 @@ fn spread(value: u32) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::format::Format;
+    use crate::packet::{AttributeStream, BufferRange, GaussianAttributes, ModelAttributes};
+    use devmem::Allocation;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use std::sync::Arc;
+
+    /// A draw of so many Gaussians at random places.
+    fn append(count: usize) -> GaussianAppend {
+        const FLOATS: usize = 14;
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let floats: Vec<f32> = (0..FLOATS * count).map(|_| rng.random()).collect();
+        let size = 4 * floats.len() as u64;
+        let memory = Allocation::new(size, false).unwrap();
+        memory.write(0, &floats).unwrap();
+        let stream = |float: u32, format| AttributeStream {
+            buffer: BufferRange {
+                memory: Arc::clone(&memory),
+                offset: 0,
+                size,
+            },
+            stride: 4 * FLOATS as u32,
+            offset: 4 * float,
+            format,
+            instance_divisor: None,
+        };
+        GaussianAppend {
+            attributes: GaussianAttributes {
+                position: stream(0, Format::R32G32B32Sfloat),
+                scale: stream(3, Format::R32G32B32Sfloat),
+                rotation: stream(6, Format::R32G32B32A32Sfloat),
+                opacity: stream(10, Format::R32Sfloat),
+                model: ModelAttributes::default(),
+                spherical_harmonics: vec![stream(11, Format::R32G32B32Sfloat)],
+            },
+            indices: None,
+            first: 0,
+            count: count as u32,
+            first_instance: 0,
+            instance_count: 1,
+        }
+    }
+
+    /// What each piece made, and all clusters.
+    fn pieces(append: &GaussianAppend) -> (Vec<usize>, Clusters) {
+        let source = ClusterSource {
+            append,
+            is_flat: false,
+            with_harmonics: true,
+        };
+        let (mut builder, mut made) = (ClusterBuilder::default(), Vec::new());
+        loop {
+            made.push(builder.advance(source));
+            if let Some(clusters) = builder.finish(source) {
+                return (made, clusters);
+            }
+        }
+    }
+
+    #[test]
+    fn pieces_make_a_cluster_of_every_gaussian() {
+        for (count, expected) in [
+            (700, vec![3]),
+            (AT_ONCE, vec![AT_ONCE / GROUP]),
+            (140_000, vec![0, 512, 35]),
+        ] {
+            let append = append(count);
+            let (made, clusters) = pieces(&append);
+            assert_eq!(made, expected);
+            let numbers = clusters.clusters.iter().flat_map(|own| &own.numbers);
+            let mut numbers: Vec<u32> = numbers.copied().collect();
+            assert_eq!(numbers, morton_order(&append));
+            numbers.sort_unstable();
+            assert!(numbers.into_iter().eq(0..count as u32));
+            for cluster in &clusters.clusters {
+                let number = u64::from(cluster.numbers[0]);
+                let memory = &append.attributes.position.buffer.memory;
+                let mut floats = [0.0f32; 14];
+                memory.read(number * 56, &mut floats).unwrap();
+                let position = cluster.attributes.position.each_ref().map(|x| x[0]);
+                assert_eq!(position, floats[..3]);
+                assert_eq!(cluster.attributes.opacity[0], floats[10]);
+                assert_eq!(cluster.harmonics().from(0)[..3], floats[11..]);
+            }
+        }
+    }
+
+    #[test]
+    fn pieces_are_eight_at_most() {
+        for count in [AT_ONCE + 1, 1_000_000, 6_000_001] {
+            assert!(count.div_ceil(piece_size(count)) <= 8, "{count}");
+            assert_eq!(piece_size(count) % GROUP, 0);
+        }
+    }
 
     #[test]
     fn bits_are_spread() {

@@ -35,18 +35,38 @@ pub(crate) struct TileFootprint {
     held: [u32; HELD_ROWS],
 }
 
-/// The number that a [`TileFootprint`] holds for a span.
-#[inline(always)]
-fn pack(span: TileSpan) -> u32 {
-    u32::from(span.first) | u32::from(span.end) << 16
+/// A span as a number: its first tile and, from bit 16 on, its end.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct PackedSpan(u32);
+
+impl From<TileSpan> for PackedSpan {
+    #[inline(always)]
+    fn from(span: TileSpan) -> Self {
+        Self(u32::from(span.first) | u32::from(span.end) << 16)
+    }
 }
 
-/// The span of such a number.
-#[inline(always)]
-fn unpack(bits: u32) -> TileSpan {
-    TileSpan {
-        first: bits as u16,
-        end: (bits >> 16) as u16,
+impl From<PackedSpan> for TileSpan {
+    #[inline(always)]
+    fn from(PackedSpan(bits): PackedSpan) -> Self {
+        Self {
+            first: bits as u16,
+            end: (bits >> 16) as u16,
+        }
+    }
+}
+
+impl PackedSpan {
+    /// The span of such a number.
+    #[inline(always)]
+    pub(super) fn from_bits(bits: u32) -> Self {
+        Self(bits)
+    }
+
+    /// Whether it has no tile.
+    #[inline(always)]
+    pub(crate) fn is_empty(self) -> bool {
+        (self.0 & 0xFFFF) >= self.0 >> 16
     }
 }
 
@@ -103,7 +123,7 @@ impl TileFootprint {
         if self.len() > HELD_ROWS {
             others[self.held[0] as usize + at] = span;
         } else {
-            self.held[at % HELD_ROWS] = pack(span);
+            self.held[at % HELD_ROWS] = PackedSpan::from(span).0;
         }
     }
 
@@ -122,7 +142,7 @@ impl TileFootprint {
         if self.len() > HELD_ROWS {
             others[self.held[0] as usize + number]
         } else {
-            unpack(self.held[number])
+            PackedSpan(self.held[number]).into()
         }
     }
 
@@ -137,18 +157,11 @@ impl TileFootprint {
         (u32::from(span.first)..u32::from(span.end)).contains(&column)
     }
 
-    /// The rows that it holds itself and, so that there are always as many, rows without tiles that may lie anywhere;
-    /// `None` if its spans lie elsewhere.
+    /// The first of the rows that it holds itself and their spans; so that there are always as many, rows without tiles, which
+    /// may lie anywhere, follow. `None` if its spans lie elsewhere.
     #[inline(always)]
-    pub(crate) fn held(&self) -> Option<[(u32, TileSpan); HELD_ROWS]> {
-        let row = self.row();
-        let [first, second, third] = self.held;
-        let rows = [
-            (row, unpack(first)),
-            (row + 1, unpack(second)),
-            (row + 2, unpack(third)),
-        ];
-        (self.len() <= HELD_ROWS).then_some(rows)
+    pub(crate) fn held(&self) -> Option<(u32, [PackedSpan; HELD_ROWS])> {
+        (self.len() <= HELD_ROWS).then(|| (self.row(), self.held.map(PackedSpan)))
     }
 }
 
@@ -202,9 +215,24 @@ pub(crate) struct Ellipse {
 /// Whole numbers stay binary64 here: to convert them would cost more than all else.
 #[inline(always)]
 fn centres(low: f64, high: f64, first: f64, last: f64) -> Option<[f64; 2]> {
-    let low = larger((low - 0.5).ceil(), first);
-    let high = smaller((high - 0.5).floor(), last);
+    // Cut off a pixel beyond the others, they are small, and rounded without calls.
+    let low = smaller(larger(low - 0.5, first), last + 1.0);
+    let high = larger(smaller(high - 0.5, last), first - 1.0);
+    let [low, high] = [-floor(-low), floor(high)];
     (low <= high).then_some([low, high])
+}
+
+/// The greatest whole number that is not greater than `value`, whose magnitude is below 2^51.
+#[inline(always)]
+fn floor(value: f64) -> f64 {
+    // What is added leaves no place for a fraction.
+    const WHOLE: f64 = (3u64 << 51) as f64;
+    let nearest = (value + WHOLE) - WHOLE;
+    if nearest > value {
+        nearest - 1.0
+    } else {
+        nearest
+    }
 }
 
 /// The larger one; `b` if either is not a number.

@@ -44,6 +44,12 @@ impl Bits {
         self.0[at / 64 % WORDS] |= mask.to_bitmask() << (at % 64);
     }
 
+    /// Whether a lane is among them.
+    #[inline(always)]
+    pub(super) fn has(&self, lane: usize) -> bool {
+        self.0[lane / 64 % WORDS] >> (lane % 64) & 1 == 1
+    }
+
     /// Of the lanes from `at` on, a multiple of `len`, which divides 64: a bit for each of `len`.
     #[inline(always)]
     pub(super) fn group(&self, at: usize, len: usize) -> u64 {

@@ -15,7 +15,7 @@ use super::ray_depth::RayDepth;
 use super::scratch::{Scratch, ScreenGaussians};
 use super::sort::ordered_bits;
 use super::spherical_harmonics::{Bases, COEFFICIENT_FLOATS, DIRECTIONS, coefficient_count};
-use super::splat::{ProjectedGroup, Splat, binary16_headroom};
+use super::splat::{ProjectedGroup, Splat, are_steep, binary16_headroom};
 use super::surfel::surfel_of;
 use super::tiles::find_tiles;
 use super::{camera, panorama, unscented};
@@ -49,11 +49,21 @@ pub(super) struct Source<'a> {
 }
 
 impl Source<'_> {
-    /// Has the spherical harmonics of degrees 0 to `degree` of some lanes on their way while other things are computed.
+    /// Has the spherical harmonics of degrees 0 to `degree` of some lanes, those with a bit in `kept`, on their way while other
+    /// things are computed.
     #[inline(always)]
-    fn prefetch_harmonics(&self, degree: u32, lanes: &[usize]) {
+    fn prefetch_harmonics(&self, degree: u32, lanes: &[usize], kept: u64) {
         let count = coefficient_count(degree);
-        for &lane in lanes {
+        if let [first, .., last] = *lanes
+            && last - first == lanes.len() - 1
+            && let Some(floats) = self.harmonics.of_all(first..=last, 3 * count)
+        {
+            return devmem::prefetch(floats);
+        }
+        for (number, &lane) in lanes.iter().enumerate() {
+            if kept >> number & 1 == 0 {
+                continue;
+            }
             match self.harmonics.from(lane) {
                 [] => self.reader.prefetch(&self.group, lane, count),
                 floats => devmem::prefetch(&floats[..floats.len().min(3 * count)]),
@@ -75,7 +85,13 @@ pub(super) fn project<S: Simd>(
     let counters = &mut out.counters;
     counters.add(Counter::GaussiansRead, source.group.len as u64);
     let kept = cull(view, simd, source, counters);
-    scratch.gather(source.attributes, &kept);
+    // What was not kept is projected all the same where that is cheap, and where nothing comes of whatever it is.
+    let is_plain = view.model == CameraModel::Pinhole
+        && view.geometry == GaussianGeometry::Volume
+        && view.precision == GaussianPrecision::Float32
+        && source.matrices.is_none()
+        && !view.unscented;
+    scratch.gather(source.attributes, &kept, source.group.len, is_plain);
     if let Some(matrices) = source.matrices {
         scratch.gather_matrices(matrices);
     }
@@ -219,7 +235,8 @@ fn flatten<S: Simd>(view: &ViewConstants, simd: S, source: &Source<'_>, scratch:
             value.store_slice(&mut lanes[at..at + S::f64s::LEN]);
         };
         let end = scratch.lanes.len().min(at + S::f64s::LEN);
-        source.prefetch_harmonics(view.sh_degree, &scratch.lanes[at..end]);
+        let kept = scratch.kept.group(at, S::f64s::LEN);
+        source.prefetch_harmonics(view.sh_degree, &scratch.lanes[at..end], kept);
         let [w, x] = [load(&rotation[0], at), load(&rotation[1], at)];
         let [y, z] = [load(&rotation[2], at), load(&rotation[3], at)];
         // What was binary32 can be squared in binary64, whatever its size.
@@ -321,9 +338,14 @@ pub(super) fn shape<S: Simd>(
     let unit = (0.5 / LN_2).sqrt();
     let (per_a, per_c) = (number(1.0) / a, number(1.0) / c);
     let vertical = (a / determinant).sqrt() * unit;
-    store(per_a.sqrt() * unit, &mut flat.factor[0]);
-    store(-(b * per_a) * vertical, &mut flat.factor[1]);
-    store(vertical, &mut flat.factor[2]);
+    let factor = [per_a.sqrt() * unit, -(b * per_a) * vertical, vertical];
+    store(factor[0], &mut flat.factor[0]);
+    store(factor[1], &mut flat.factor[1]);
+    store(factor[2], &mut flat.factor[2]);
+    if at == 0 {
+        flat.steep = Bits::default();
+    }
+    flat.steep.set(at, are_steep::<S>(factor, log2_opacity));
     // The tile engine evaluates the exponent in binary32: a margin wider than its error keeps every
     // pixel that it would accept. What cannot reach the floor even so has a negative extent.
     let room = log2_opacity - view.log2_floor;
@@ -400,19 +422,28 @@ fn center_depth(view: &ViewConstants, at: usize, scratch: &Scratch) -> u32 {
         .map_or(0, |depth| depth.code(scratch.depth[at] as f32))
 }
 
-/// What a kept lane is sorted by.
+/// Finds what each lane is sorted by, and which of the set it is.
 #[inline(always)]
-fn key(view: &ViewConstants, at: usize, sequence: u32, scratch: &Scratch) -> u32 {
-    let depth = match view.order {
-        GaussianOrder::ViewDepth => scratch.depth[at],
+fn find_keys(view: &ViewConstants, sequence: impl Fn(usize) -> u32, scratch: &mut Scratch) {
+    let [keys, sequences] = &mut *scratch.keys;
+    for (to, &lane) in sequences.iter_mut().zip(&scratch.lanes) {
+        *to = sequence(lane);
+    }
+    match view.order {
+        GaussianOrder::ViewDepth => {
+            for (key, &depth) in keys.iter_mut().zip(&*scratch.depth) {
+                *key = ordered_bits(depth as f32);
+            }
+        }
         GaussianOrder::RadialDistance => {
             let [x, y, z] = &*scratch.offset;
-            (x[at] * x[at] + y[at] * y[at] + z[at] * z[at]).sqrt()
+            for (key, ((x, y), z)) in keys.iter_mut().zip(x.iter().zip(y).zip(z)) {
+                *key = ordered_bits((x * x + y * y + z * z).sqrt() as f32);
+            }
         }
         // Pixels sort later, and take the order of the draw for equal depths.
-        GaussianOrder::Primitive | GaussianOrder::PerPixel => return sequence,
-    };
-    ordered_bits(depth as f32)
+        GaussianOrder::Primitive | GaussianOrder::PerPixel => *keys = *sequences,
+    }
 }
 
 /// What a kept lane is sorted by at a pixel.
@@ -440,6 +471,7 @@ pub(super) fn emit<S: Simd>(
 ) {
     out.reserve(scratch.lanes.len());
     find_tiles(view, simd, scratch, out);
+    find_keys(view, sequence, scratch);
     let reader = &source.reader;
     let degree = view.sh_degree;
     let floats = reader.floats();
@@ -475,11 +507,11 @@ pub(super) fn emit<S: Simd>(
             }
         }
         let Some(period) = view.period else {
-            append(view, colored.all(), scratch, &sequence, out);
+            append(view, colored.all(), scratch, out);
             continue;
         };
         for one in colored.all() {
-            append(view, std::slice::from_ref(one), scratch, &sequence, out);
+            append(view, std::slice::from_ref(one), scratch, out);
             panorama::copy_last(one.at, period, &mut copies, out);
         }
     }
@@ -497,26 +529,26 @@ fn append(
     view: &ViewConstants,
     lanes: &[ColoredLane],
     scratch: &Scratch,
-    sequence: &impl Fn(usize) -> u32,
     out: &mut ProjectedGroup,
 ) {
     // Iterators that know their lengths write without a look at the room that there is.
-    out.keys.extend(lanes.iter().map(|one| {
-        let sequence = sequence(scratch.lanes[one.at % GROUP]);
-        [key(view, one.at, sequence, scratch), sequence]
-    }));
-    out.splats.extend(lanes.iter().map(|one| {
-        let depth = center_depth(view, one.at, scratch);
-        let wide = view
-            .period
-            .is_some_and(|period| 2.0 * scratch.flat.half[0][one.at] >= period);
-        let splat = Splat::new(&scratch.flat, one.at, one.color, depth);
-        Splat {
-            needs_f64: wide || splat.needs_f64,
-            exceeds_period: wide,
-            ..splat
-        }
-    }));
+    let [keys, sequences] = &*scratch.keys;
+    let keys = lanes.iter().map(|one| [keys[one.at], sequences[one.at]]);
+    out.keys.extend(keys);
+    let splats = lanes.iter().map(|one| one.splat(view, scratch));
+    match view.period {
+        None => out.splats.extend(splats),
+        Some(period) => out
+            .splats
+            .extend(lanes.iter().zip(splats).map(|(one, splat)| {
+                let wide = 2.0 * scratch.flat.half[0][one.at] >= period;
+                Splat {
+                    needs_f64: wide || splat.needs_f64,
+                    exceeds_period: wide,
+                    ..splat
+                }
+            })),
+    }
     let reaches = lanes.iter().map(|one| scratch.reaches.get(one.at));
     out.reaches.extend(reaches);
     if view.geometry == GaussianGeometry::Surfel {
@@ -535,7 +567,18 @@ fn append(
 #[derive(Clone, Copy, Debug, Default)]
 struct ColoredLane {
     at: usize,
-    color: [f32; 3],
+    /// The fourth number is not one of the colour's.
+    color: [f32; 4],
+}
+
+impl ColoredLane {
+    /// What the tile engine needs of it.
+    #[inline(always)]
+    fn splat(&self, view: &ViewConstants, scratch: &Scratch) -> Splat {
+        let [red, green, blue, _] = self.color;
+        let depth = center_depth(view, self.at, scratch);
+        Splat::new(&scratch.flat, self.at, [red, green, blue], depth)
+    }
 }
 
 /// Those of some directions.
@@ -547,7 +590,7 @@ struct Colored {
 
 impl Colored {
     #[inline(always)]
-    fn push(&mut self, at: usize, color: [f32; 3]) {
+    fn push(&mut self, at: usize, color: [f32; 4]) {
         self.lanes[self.len % DIRECTIONS] = ColoredLane {
             at: at % GROUP,
             color,

@@ -5,6 +5,9 @@ use super::footprint::TileFootprint;
 use super::instances::{Matrices, Placed};
 use super::lanes::{Bits, F32_LANES, GROUP, GroupF64, NO_GROUP_F64};
 
+/// Where at most one lane of so many is not kept, it is not left out.
+const MOST: usize = 4;
+
 /// The reach of each lane, as the two words of [`TileFootprint::words`].
 pub(super) struct TileFootprints(pub(super) [[u64; GROUP + 8]; 2]);
 
@@ -30,8 +33,10 @@ impl TileFootprints {
 
 /// What becomes of a group's Gaussians: of those that were kept, densely, in structures of arrays.
 pub(crate) struct Scratch {
-    /// The lanes that were kept; what follows is in their order.
+    /// The lanes that were read, in the order of all that follows.
     pub(super) lanes: Vec<usize>,
+    /// Which of them were kept: all, but where most were, and to leave the others out would take longer.
+    pub(super) kept: Bits,
     pub(super) position: Box<[GroupF64; 3]>,
     pub(super) scale: Box<[GroupF64; 3]>,
     pub(super) rotation: Box<[GroupF64; 4]>,
@@ -55,6 +60,8 @@ pub(crate) struct Scratch {
     pub(super) reaches: Box<TileFootprints>,
     /// The same of their copies a period beside, in the same order: which side's, 0 or 1, in the middle.
     pub(super) copies: Vec<(usize, usize, TileFootprint)>,
+    /// What each is sorted by, and its place in the set.
+    pub(super) keys: Box<[[u32; GROUP]; 2]>,
 }
 
 /// Gaussians on the screen.
@@ -62,6 +69,8 @@ pub(super) struct ScreenGaussians {
     pub(super) mean: [GroupF64; 2],
     pub(super) determinant: GroupF64,
     pub(super) log2_opacity: GroupF64,
+    /// Those whose exponents are formed in binary64.
+    pub(super) steep: Bits,
     /// See [`Splat::factor`](super::project::Splat::factor).
     pub(super) factor: [GroupF64; 3],
     /// See [`Ellipse`](super::footprint::Ellipse).
@@ -79,6 +88,7 @@ impl Default for ScreenGaussians {
             mean: [NO_GROUP_F64; 2],
             determinant: NO_GROUP_F64,
             log2_opacity: NO_GROUP_F64,
+            steep: Bits::default(),
             factor: [NO_GROUP_F64; 3],
             half: [NO_GROUP_F64; 2],
             slope: NO_GROUP_F64,
@@ -94,6 +104,7 @@ impl Scratch {
     pub(crate) fn new() -> Self {
         Self {
             lanes: Vec::with_capacity(GROUP),
+            kept: Bits::default(),
             position: Box::new([NO_GROUP_F64; 3]),
             scale: Box::new([NO_GROUP_F64; 3]),
             rotation: Box::new([NO_GROUP_F64; 4]),
@@ -108,16 +119,31 @@ impl Scratch {
             reached: Vec::with_capacity(GROUP),
             reaches: Box::default(),
             copies: Vec::new(),
+            keys: Box::new([[0; GROUP]; 2]),
         }
     }
 
-    /// Packs the kept lanes densely, as binary64.
+    /// Packs the kept lanes of `len` densely, as binary64; if `may_have_others` and there are few others, all lanes stay where
+    /// they are.
     #[inline(always)]
-    pub(super) fn gather(&mut self, attributes: &Attributes, kept: &Bits) {
+    pub(super) fn gather(
+        &mut self,
+        attributes: &Attributes,
+        kept: &Bits,
+        len: usize,
+        may_have_others: bool,
+    ) {
         self.lanes.clear();
-        kept.for_each(|lane| self.lanes.push(lane));
+        let count = kept.count() as usize;
+        let whole = count == GROUP || may_have_others && MOST * count >= (MOST - 1) * len;
+        if whole {
+            self.lanes.extend(0..len.min(GROUP));
+            self.kept = *kept;
+        } else {
+            kept.for_each(|lane| self.lanes.push(lane));
+            self.kept = Bits::first(count);
+        }
         let lanes = &*self.lanes;
-        let whole = lanes.len() == GROUP;
         let pack = |from: &[f32; F32_LANES], to: &mut GroupF64| {
             if whole {
                 for (to, &from) in to.iter_mut().zip(from) {
@@ -154,6 +180,50 @@ impl Scratch {
             for (to, &lane) in to.iter_mut().zip(&self.lanes) {
                 *to = from[lane % GROUP].into();
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lanes_that_are_kept_are_the_same_among_others_and_alone() {
+        let mut attributes = Attributes::default();
+        for (lane, (x, opacity)) in (attributes.position[0].iter_mut())
+            .zip(&mut attributes.opacity)
+            .enumerate()
+        {
+            (*x, *opacity) = (lane as f32, 0.5 + lane as f32);
+        }
+        for (len, left_out) in [(GROUP, 5), (GROUP, 3), (200, 5), (200, 3), (GROUP, GROUP)] {
+            let mut kept = Bits::first(len);
+            let out = (0..len).filter(|lane| lane % left_out == left_out - 1);
+            let mut others = Bits::default();
+            out.for_each(|lane| others.set_one(lane, true));
+            if left_out < GROUP {
+                kept = kept.without(&others);
+            }
+            let values = |may_have_others: bool| {
+                let mut scratch = Scratch::new();
+                scratch.gather(&attributes, &kept, len, may_have_others);
+                let mut values = Vec::new();
+                scratch.kept.for_each(|at| {
+                    let (x, opacity) = (scratch.position[0][at], scratch.opacity[at]);
+                    values.push((scratch.lanes[at], x, opacity));
+                });
+                (scratch.lanes.len(), values)
+            };
+            let [(among, of_all), (alone, of_kept)] = [true, false].map(values);
+            assert_eq!(of_all, of_kept);
+            let count = kept.count() as usize;
+            assert_eq!(alone, count);
+            assert_eq!(among, if 4 * count >= 3 * len { len } else { count });
+            let expected = |lane: usize| (lane, lane as f64, 0.5 + lane as f64);
+            let mut lanes = Vec::new();
+            kept.for_each(|lane| lanes.push(expected(lane)));
+            assert_eq!(of_kept, lanes);
         }
     }
 }

@@ -108,7 +108,7 @@ impl Bases {
     /// degrees 0 to `degree` is not finite.
     ///
     /// `coefficients` holds red, green and blue of each coefficient in turn, and at least one number more; what follows
-    /// them is not used.
+    /// them is not used. The colour has a fourth number, which means nothing.
     #[inline(always)]
     pub(super) fn color<S: Simd>(
         &self,
@@ -116,7 +116,7 @@ impl Bases {
         degree: u32,
         direction: usize,
         coefficients: &[f32],
-    ) -> Option<[f32; 3]> {
+    ) -> Option<[f32; 4]> {
         let at = direction % DIRECTIONS;
         let sum = match degree {
             0 => self.sum::<S, 1>(simd, at, coefficients),
@@ -130,13 +130,12 @@ impl Bases {
         if (sum * 0.0).simd_eq(0.0).to_bitmask() & 7 != 7 {
             return self.wide_color(degree, at, coefficients);
         }
-        let color = sum.max(0.0);
-        Some([color[0], color[1], color[2]])
+        Some(sum.max(0.0).to_array())
     }
 
     /// The same where a sum is not finite: in binary64, where no sum of numbers overflows.
     #[cold]
-    fn wide_color(&self, degree: u32, direction: usize, coefficients: &[f32]) -> Option<[f32; 3]> {
+    fn wide_color(&self, degree: u32, direction: usize, coefficients: &[f32]) -> Option<[f32; 4]> {
         let count = coefficient_count(degree).min(MAX_COEFFICIENTS);
         if !coefficients[..3 * count].iter().all(|k| k.is_finite()) {
             return None;
@@ -147,7 +146,8 @@ impl Bases {
                 *sum += f64::from(lanes[direction]) * f64::from(*k);
             }
         }
-        Some(sum.map(|value| value.max(0.0).min(f64::from(f32::MAX)) as f32))
+        let [red, green, blue] = sum.map(|value| value.max(0.0).min(f64::from(f32::MAX)) as f32);
+        Some([red, green, blue, 0.0])
     }
 
     /// 0.5 and the sum of `COUNT` coefficients times their functions.
@@ -204,7 +204,8 @@ mod tests {
 
     fn color(degree: u32, direction: [f32; 3], sh: &[f32; COEFFICIENT_FLOATS]) -> Option<[f32; 3]> {
         let bases = bases(degree, direction);
-        dispatch!(Level::new(), simd => bases.color(simd, degree, 5, sh))
+        let color = dispatch!(Level::new(), simd => bases.color(simd, degree, 5, sh));
+        color.map(|[red, green, blue, _]| [red, green, blue])
     }
 
     fn coefficients(values: &[(usize, [f32; 3])]) -> [f32; COEFFICIENT_FLOATS] {

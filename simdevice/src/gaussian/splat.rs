@@ -7,6 +7,7 @@ use super::scratch::ScreenGaussians;
 use super::surfel::Surfel;
 use crate::stats::counters::Counters;
 use devmem::host;
+use fearless_simd::{Simd, prelude::*};
 
 /// A projected Gaussian: what the tile engine needs of it, in one cache line.
 ///
@@ -36,14 +37,13 @@ impl Splat {
     /// A lane's.
     #[inline(always)]
     pub(super) fn new(flat: &ScreenGaussians, at: usize, color: [f32; 3], depth: u32) -> Self {
-        let factor = [flat.factor[0][at], flat.factor[1][at], flat.factor[2][at]];
         Self {
             mean: [flat.mean[0][at], flat.mean[1][at]],
-            factor,
+            factor: [flat.factor[0][at], flat.factor[1][at], flat.factor[2][at]],
             log2_opacity: flat.log2_opacity[at] as f32,
             color,
             depth,
-            needs_f64: is_steep(factor, flat.log2_opacity[at]),
+            needs_f64: flat.steep.has(at),
             exceeds_period: false,
         }
     }
@@ -56,11 +56,13 @@ const STEEP_LOG2_OPACITY: f64 = 4.0;
 /// variance of 0.3 px^2 keeps all factors below 1.6.
 const STEEP_FACTOR: f64 = 8.0;
 
-/// Whether a Gaussian's exponents must be formed in binary64. It depends on the Gaussian alone.
+/// Which Gaussians' exponents must be formed in binary64. It depends on each Gaussian alone.
 #[inline(always)]
-fn is_steep([a, b, c]: [f64; 3], log2_opacity: f64) -> bool {
-    let largest = a.abs().max(b.abs()).max(c.abs());
-    largest > STEEP_FACTOR || log2_opacity > STEEP_LOG2_OPACITY
+pub(super) fn are_steep<S: Simd>(factor: [S::f64s; 3], log2_opacity: S::f64s) -> S::mask64s {
+    // The first and the last one are never negative. What is not a number is no greater.
+    let [a, b, c] = factor;
+    (a.simd_gt(STEEP_FACTOR) | b.abs().simd_gt(STEEP_FACTOR))
+        | (c.simd_gt(STEEP_FACTOR) | log2_opacity.simd_gt(STEEP_LOG2_OPACITY))
 }
 
 /// The least factor, in 1/px, whose binary16 value is as exact as that of others.

@@ -8,10 +8,9 @@
 //! Where lists would outgrow their budget, as those of a million Gaussians that fill a large screen do, there are none:
 //! each tile then walks the sorted sequence itself, a piece at a time, until it is saturated.
 
-use super::footprint::{HELD_ROWS, TileFootprint, TileSpan};
+use super::footprint::{HELD_ROWS, PackedSpan, TileFootprint, TileSpan};
 use super::splat::{ProjectedGroup, locate};
 use crate::limits::TILE_SIZE;
-use crate::simd::three;
 use crate::state::Rect;
 use devmem::host;
 use rayon::prelude::*;
@@ -121,33 +120,40 @@ struct Rows {
     first: u32,
     /// Of each row: its band, and the number that its first tile has there. One more is for all others.
     places: Vec<(u32, u32)>,
+    /// Tiles of a row.
+    columns: u32,
 }
 
-/// Tiles that follow one another in a row of a band, and a primitive that reaches them: the first one's number and, from
-/// bit [`COUNT_AT`] on, how many; then the primitive.
-type TileRun = [u32; 2];
+/// Tiles that follow one another in a row, and a primitive that reaches them.
+#[derive(Clone, Copy, Debug, Default)]
+struct TileRun {
+    /// The number of the row's first tile in its band.
+    row_start: u32,
+    span: PackedSpan,
+    primitive: u32,
+}
 
-/// Bits of a tile's number in its band.
-const COUNT_AT: u32 = 22;
+impl TileRun {
+    /// The number of its first tile in the band, and that after its last.
+    #[inline(always)]
+    fn tiles(self) -> [usize; 2] {
+        let TileSpan { first, end } = self.span.into();
+        [first, end].map(|column| self.row_start as usize + usize::from(column))
+    }
+}
 
-/// The most tiles of a band.
-const MAX_TILES: u32 = 1 << COUNT_AT;
-
-/// The most tiles of a strip.
-const MAX_COUNT: u32 = (1 << (32 - COUNT_AT)) - 1;
-
-/// TileRuns of a band in the order of primitives. There is room behind them.
+/// Runs of a band in the order of primitives. There is room behind them.
 #[derive(Debug)]
 struct TileRuns {
-    strips: Vec<TileRun>,
+    runs: Vec<TileRun>,
     len: usize,
 }
 
-/// Primitives whose reaches are fetched ahead, and whose pairs are counted before the budget is looked at.
+/// Primitives whose reaches are fetched ahead, and whose runs are counted before the budget is looked at.
 const GATHERED: usize = 64;
 
-/// TileRuns that there is room for in the beginning, for each primitive: most have one or two.
-const STRIPS_PER_PRIMITIVE: usize = 2;
+/// Runs that there is room for in the beginning, for each primitive: most have one or two.
+const RUNS_PER_PRIMITIVE: usize = 2;
 
 /// Primitives that a worker brings into order at a time.
 const RUN: usize = 4096;
@@ -177,17 +183,17 @@ impl TileLists {
         let rows = tile(i64::from(bounds.y) + i64::from(bounds.height) - 1) - first_row + 1;
         let columns = tile(i64::from(bounds.x) + i64::from(bounds.width) - 1) + 1;
         let threads = threads.max(1);
-        let band_rows = rows
-            .div_ceil(threads as u32)
-            .min((MAX_TILES / columns).max(1));
+        let band_rows = rows.div_ceil(threads as u32);
         let bands = rows.div_ceil(band_rows) as usize;
         let places = |row: u32| (row / band_rows, row % band_rows * columns);
         let grid = Rows {
             first: first_row,
             places: host::collect((0..rows).map(places).chain([(bands as u32 - 1, 0)])),
+            columns,
         };
-        let pairs = AtomicU64::new(0);
-        let allow = |more: u64| pairs.fetch_add(more, Relaxed) + more <= most_pairs;
+        // No run is without a pair.
+        let written = AtomicU64::new(0);
+        let allow = |more: u64| written.fetch_add(more, Relaxed) + more <= most_pairs;
         let seen = Groups {
             reaches: host::collect(groups.iter().map(|group| &*group.reaches)),
             spans: host::collect(groups.iter().map(|group| &*group.spans)),
@@ -196,7 +202,19 @@ impl TileLists {
             .par_chunks(order.len().div_ceil(threads))
             .map(|run| grid.expand(&seen, run, bands, allow))
             .collect();
-        let Some(runs) = runs else {
+        let bands = runs.and_then(|runs| {
+            let of_band = |band: usize| host::collect(runs.iter().map(|run| run[band].written()));
+            let tiles = (band_rows * columns) as usize;
+            let counted: Vec<TileCounts> = (0..bands)
+                .into_par_iter()
+                .map(|band| TileCounts::new(&of_band(band), tiles))
+                .collect();
+            let pairs = counted.iter().map(|counts| counts.pairs).sum::<u64>();
+            let place = |(band, counts)| RowBand::place(&of_band(band), counts);
+            let place_all = || counted.into_par_iter().enumerate().map(place).collect();
+            (pairs <= most_pairs).then(place_all)
+        });
+        let Some(bands) = bands else {
             return Self {
                 first_row,
                 columns,
@@ -205,13 +223,6 @@ impl TileLists {
                 walk: Some(SortedWalk::new(groups, order)),
             };
         };
-        let bands = (0..bands)
-            .into_par_iter()
-            .map(|band| {
-                let written = runs.iter().map(|run| run[band].written());
-                RowBand::place(&host::collect(written), (band_rows * columns) as usize)
-            })
-            .collect();
         Self {
             first_row,
             columns,
@@ -276,151 +287,167 @@ impl TileLists {
 }
 
 impl Rows {
-    /// The strips of a run of the sorted sequence, in its order, by band.
+    /// The runs of a part of the sorted sequence, in its order, by band.
     /// `None` once the budget does not `allow` for so many more.
     fn expand(
         &self,
         groups: &Groups<'_>,
-        run: &[(u32, u32)],
+        part: &[(u32, u32)],
         bands: usize,
         allow: impl Fn(u64) -> bool,
     ) -> Option<Vec<TileRuns>> {
-        let about = run.len() * STRIPS_PER_PRIMITIVE / bands;
-        let mut strips = host::collect((0..bands).map(|_| TileRuns::with_room(about)));
+        let about = part.len() * RUNS_PER_PRIMITIVE / bands;
+        let mut runs = host::collect((0..bands).map(|_| TileRuns::with_room(about)));
         let others = self.places.len() - 1;
-        let strip = |(row, span): (u32, TileSpan)| {
-            // Rows without tiles may lie outside.
-            let row = (row.wrapping_sub(self.first) as usize).min(others);
-            let (band, first) = self.places[row];
-            let first = first + u32::from(span.first);
-            (band as usize, first, span.len() as u32)
-        };
+        // Rows without tiles may lie outside.
+        let place = |row: u32| self.places[(row.wrapping_sub(self.first) as usize).min(others)];
         let reach_of = |&(_, primitive): &(u32, u32)| {
             let (group, place) = locate(primitive);
             &groups.reaches[group][place]
         };
-        let mut ahead = run.chunks(GATHERED).skip(1);
-        for some in run.chunks(GATHERED) {
+        let mut ahead = part.chunks(GATHERED).skip(1);
+        for some in part.chunks(GATHERED) {
             // They lie anywhere, so that each would be waited for.
             for next in ahead.next().unwrap_or_default() {
                 devmem::prefetch(std::slice::from_ref(reach_of(next)));
             }
-            let mut count = 0;
+            let before = written(&runs);
             for named in some {
                 let (reach, &(_, primitive)) = (reach_of(named), named);
-                if let Some(rows) = reach.held() {
-                    let [one, two, three] = three(rows, strip);
-                    count += u64::from(one.2 + two.2 + three.2);
-                    if one.0 == three.0 && one.2.max(two.2).max(three.2) <= MAX_COUNT {
-                        let of = [(one.1, one.2), (two.1, two.2), (three.1, three.2)];
-                        strips[one.0].push_small(of, primitive);
+                if let Some((row, spans)) = reach.held() {
+                    let (band, row_start) = place(row);
+                    let (last_band, _) = place(row + HELD_ROWS as u32 - 1);
+                    let run = TileRun {
+                        row_start,
+                        span: PackedSpan::default(),
+                        primitive,
+                    };
+                    if band == last_band {
+                        runs[band as usize].push_rows(run, spans, self.columns);
                         continue;
                     }
-                    for (band, first, tiles) in [one, two, three] {
-                        strips[band].push(first, tiles, primitive);
-                    }
-                } else {
-                    let others = groups.spans[locate(primitive).0];
-                    for (band, first, tiles) in reach.spans(others).map(strip) {
-                        count += u64::from(tiles);
-                        strips[band].push(first, tiles, primitive);
-                    }
+                }
+                let others = groups.spans[locate(primitive).0];
+                for (row, span) in reach.spans(others).filter(|(_, span)| span.len() > 0) {
+                    let (band, row_start) = place(row);
+                    let span = span.into();
+                    runs[band as usize].push(TileRun {
+                        row_start,
+                        span,
+                        primitive,
+                    });
                 }
             }
-            if !allow(count) {
+            if !allow((written(&runs) - before) as u64) {
                 return None;
             }
         }
-        Some(strips)
+        Some(runs)
     }
+}
+
+/// How many runs are written in all bands.
+fn written(runs: &[TileRuns]) -> usize {
+    runs.iter().map(|runs| runs.len).sum()
 }
 
 impl TileRuns {
     /// None yet, with room for about so many.
     fn with_room(count: usize) -> Self {
         Self {
-            strips: host::filled([0; 2], count.max(1024)),
+            runs: host::filled(TileRun::default(), count.max(1024)),
             len: 0,
         }
     }
 
-    /// Adds what a primitive reaches in three rows: the first tile of each and how many, at most [`MAX_COUNT`].
+    /// Adds a run for each of some rows that has tiles: `first` is the first row's, but for its span, and a row has so many
+    /// `columns`.
     #[inline(always)]
-    fn push_small(&mut self, rows: [(u32, u32); HELD_ROWS], primitive: u32) {
-        if self.strips.len() < self.len + HELD_ROWS {
+    fn push_rows(&mut self, first: TileRun, spans: [PackedSpan; HELD_ROWS], columns: u32) {
+        if self.runs.len() < self.len + HELD_ROWS {
             self.grow();
         }
-        let room = &mut self.strips[self.len..self.len + HELD_ROWS];
-        let mut len = 0;
-        for (first, count) in rows {
+        let room = &mut self.runs[self.len..self.len + HELD_ROWS];
+        let (mut run, mut len) = (first, 0);
+        for span in spans {
             // What has no tiles is written over.
-            room[len] = [first | count << COUNT_AT, primitive];
-            len += usize::from(count > 0);
+            room[len] = TileRun { span, ..run };
+            len += usize::from(!span.is_empty());
+            run.row_start = run.row_start.wrapping_add(columns);
         }
         self.len += len;
     }
 
-    /// Adds a primitive and `count` tiles from `first` on.
-    fn push(&mut self, mut first: u32, mut count: u32, primitive: u32) {
-        while count > 0 {
-            if self.len == self.strips.len() {
-                self.grow();
-            }
-            let some = count.min(MAX_COUNT);
-            self.strips[self.len] = [first | some << COUNT_AT, primitive];
-            self.len += 1;
-            first += some;
-            count -= some;
+    /// Adds a run.
+    fn push(&mut self, run: TileRun) {
+        if self.len == self.runs.len() {
+            self.grow();
         }
+        self.runs[self.len] = run;
+        self.len += 1;
     }
 
     #[cold]
     fn grow(&mut self) {
-        let len = 2 * self.strips.len();
-        host::resize(&mut self.strips, len, [0; 2]);
+        let len = 2 * self.runs.len();
+        host::resize(&mut self.runs, len, TileRun::default());
     }
 
     fn written(&self) -> &[TileRun] {
-        &self.strips[..self.len]
+        &self.runs[..self.len]
+    }
+}
+
+/// Where the lists of a band's tiles begin.
+struct TileCounts {
+    /// Of each tile, and the end of all. Each list has room for one more.
+    starts: Vec<u32>,
+    pairs: u64,
+}
+
+impl TileCounts {
+    /// Of a band of so many tiles, by its runs.
+    fn new(runs: &[&[TileRun]], tiles: usize) -> Self {
+        // Changes of the count from tile to tile.
+        let mut starts: Vec<u32> = host::zeroed(tiles + 1);
+        for runs in runs {
+            for &run in *runs {
+                let [first, end] = run.tiles();
+                starts[first] = starts[first].wrapping_add(1);
+                starts[end] = starts[end].wrapping_sub(1);
+            }
+        }
+        let (mut pairs, mut count) = (0, 0u32);
+        for (number, start) in starts.iter_mut().enumerate() {
+            count = count.wrapping_add(*start);
+            // If it does not fit, there are too many pairs.
+            *start = (pairs + number as u64) as u32;
+            pairs += u64::from(count);
+        }
+        Self { starts, pairs }
     }
 }
 
 impl RowBand {
-    /// Counts, then places the strips of a band of so many tiles, in their order.
-    fn place(runs: &[&[TileRun]], tiles: usize) -> Self {
-        let parts = |[tile, primitive]: TileRun| {
-            let first = tile & ((1 << COUNT_AT) - 1);
-            (first as usize, tile >> COUNT_AT, primitive)
-        };
-        // Changes of the count from tile to tile.
-        let mut starts: Vec<u32> = host::zeroed(tiles + 1);
-        for &strip in runs.iter().copied().flatten() {
-            let (first, count, _) = parts(strip);
-            let end = first + count as usize;
-            starts[first] = starts[first].wrapping_add(1);
-            starts[end] = starts[end].wrapping_sub(1);
-        }
-        let (mut total, mut count) = (0, 0u32);
-        for start in &mut starts {
-            count = count.wrapping_add(*start);
-            *start = total;
-            // Room for one more.
-            total += count + 1;
-        }
+    /// Places the runs of a band, in their order.
+    fn place(runs: &[&[TileRun]], counts: TileCounts) -> Self {
+        let TileCounts { starts, pairs } = counts;
         let mut ends = host::copied(&starts);
-        let mut primitives: Vec<u32> = host::zeroed(total as usize);
-        for &strip in runs.iter().copied().flatten() {
-            let (first, count, primitive) = parts(strip);
-            // Most have one tile or two, which no branch foresees: what is not wanted is written over.
-            let mut put = |tile: usize, wanted: bool| {
-                let end = ends[tile];
-                primitives[end as usize] = primitive;
-                ends[tile] = end + u32::from(wanted);
-            };
-            put(first, true);
-            put(first + 1, count > 1);
-            for tile in 2..count as usize {
-                put(first + tile, true);
+        let mut primitives: Vec<u32> = host::zeroed(pairs as usize + starts.len());
+        for runs in runs {
+            for &run in *runs {
+                let [first, end] = run.tiles();
+                // Most have one tile or two, which no branch foresees: what is not wanted is written over.
+                let mut put = |tile: usize, wanted: bool| {
+                    let end = ends[tile];
+                    primitives[end as usize] = run.primitive;
+                    ends[tile] = end + u32::from(wanted);
+                };
+                put(first, true);
+                put(first + 1, first + 1 < end);
+                for tile in first + 2..end {
+                    put(tile, true);
+                }
             }
         }
         Self {

@@ -1,8 +1,8 @@
 //! Which of a group's kept Gaussians reach tiles, and which tiles: for several at once where they are small, which most
-//! are, and one at a time for the others.
+//! are, several rows at once where they are not, and one at a time for the others.
 
 use super::camera::ViewConstants;
-use super::footprint::{Ellipse, HELD_ROWS, TileFootprint};
+use super::footprint::{Ellipse, HELD_ROWS, PackedSpan, TileFootprint, TileSpan};
 use super::lanes::{Bits, GroupF64};
 use super::panorama;
 use super::scratch::{Scratch, ScreenGaussians};
@@ -25,6 +25,8 @@ const MODERATE: f64 = 1e100;
 struct Found {
     /// Those that reach tiles; [`TileFootprints`] holds which.
     reached: Bits,
+    /// Those that may reach more rows of tiles than a [`TileFootprint`] holds itself.
+    tall: Bits,
     /// Those of which nothing is told.
     left: Bits,
 }
@@ -65,6 +67,44 @@ impl<S: Simd> Range<S> {
     #[inline(always)]
     fn span(&self) -> S::f64s {
         self.first + (self.last + 1.0) * 65536.0
+    }
+}
+
+/// Ellipses, in which rows of tiles are looked for; see [`Ellipse`].
+struct Ellipses<S: Simd> {
+    mean: [S::f64s; 2],
+    slope: S::f64s,
+    narrowing: S::f64s,
+    peak: S::f64s,
+    /// The square of half their extent in y.
+    square: S::f64s,
+    /// Their rows of pixels.
+    along: Range<S>,
+    /// The first and the last visible column of pixels.
+    columns: [S::f64s; 2],
+}
+
+impl<S: Simd> Ellipses<S> {
+    /// What they reach in a row of tiles each, and whether the row is one of theirs and they reach something there, in the
+    /// steps of [`Ellipse::reach`].
+    #[inline(always)]
+    fn row(&self, simd: S, row: S::f64s) -> (Range<S>, S::mask64s) {
+        let number = |value: f64| S::f64s::splat(simd, value);
+        let (zero, tile) = (number(0.0), f64::from(TILE_SIZE));
+        let [x, y] = self.mean;
+        let row_top = row * tile;
+        let above = self.along.low.max(row_top) + 0.5 - y;
+        let below = self.along.high.min(row_top + (tile - 1.0)) + 0.5 - y;
+        // See [`Ellipse::sides`].
+        let to_left = (zero - self.peak).max(above).min(below);
+        let to_right = self.peak.max(above).min(below);
+        let width =
+            |height: S::f64s| (self.narrowing * (self.square - height * height).max(zero)).sqrt();
+        let low = x + (self.slope * to_left - width(to_left));
+        let high = x + (self.slope * to_right + width(to_right));
+        let range = Range::new(low, high, self.columns);
+        let within = range.any & row.simd_le(self.along.last);
+        (range, within)
     }
 }
 
@@ -114,14 +154,26 @@ fn find_tiles_by<S: Simd>(
 ) {
     let drawn = find_drawn(view, simd, scratch, &mut out.counters);
     let mut beside = 0;
-    let Found { mut reached, left } = if by_lanes {
+    let found = if by_lanes {
         reach_in_lanes(view, simd, &drawn, scratch, &mut beside)
     } else {
         Found {
             reached: Bits::default(),
+            tall: Bits::default(),
             left: drawn,
         }
     };
+    let Found {
+        mut reached,
+        tall,
+        left,
+    } = found;
+    tall.for_each(|at| {
+        if let Some(reach) = reach_by_rows(view, simd, at, scratch, &mut out.spans, &mut beside) {
+            scratch.reaches.set(at, &reach);
+            reached.set_one(at, true);
+        }
+    });
     scratch.copies.clear();
     left.for_each(|at| {
         if let Some(reach) = reach_of_one(view, at, scratch, out, &mut beside) {
@@ -166,7 +218,7 @@ fn find_drawn<S: Simd>(
     if is_flat {
         definite = Bits::first(len);
     }
-    let kept = Bits::first(len);
+    let kept = scratch.kept;
     let seen = kept.and(&beyond_near);
     counters.add(Counter::SkippedNear, kept.without(&seen).count());
     counters.add(Counter::SkippedFar, seen.and(&beyond_far).count());
@@ -188,9 +240,10 @@ fn reach_in_lanes<S: Simd>(
     let number = |value: f64| S::f64s::splat(simd, value);
     let columns = both(view.visible.pixels(0), number);
     let rows = both(view.visible.pixels(1), number);
-    let (zero, one, tile) = (number(0.0), number(1.0), number(TILE_SIZE.into()));
+    let (zero, one) = (number(0.0), number(1.0));
     let mut found = Found {
         reached: Bits::default(),
+        tall: Bits::default(),
         left: Bits::default(),
     };
     let mut apart = zero;
@@ -218,29 +271,34 @@ fn reach_in_lanes<S: Simd>(
         let inside = drawn & moderate & across.any & along.any;
         let (wide, tall) = (across.tiles(), along.tiles());
         let short = tall.simd_le(number(HELD_ROWS as f64));
-        found.left.set(at, (drawn & !moderate) | (inside & !short));
+        found.left.set(at, drawn & !moderate);
+        found.tall.set(at, inside & !short);
         let clipped = across.low.simd_eq(columns[0])
             | across.high.simd_eq(columns[1])
             | along.low.simd_eq(rows[0])
             | along.high.simd_eq(rows[1]);
         let single = wide.simd_eq(one) & tall.simd_eq(one) & !clipped;
 
-        let square = half_y * half_y;
+        let ellipses = Ellipses::<S> {
+            mean: [x, y],
+            slope,
+            narrowing,
+            peak,
+            square: half_y * half_y,
+            along,
+            columns,
+        };
+        let along = &ellipses.along;
         let mut row = along.first;
         let mut reached = zero;
         let mut spans = [zero; HELD_ROWS];
         for (number, span) in spans.iter_mut().enumerate() {
-            let row_top = row * tile;
-            let above = along.low.max(row_top) + 0.5 - y;
-            let below = along.high.min(row_top + (tile - 1.0)) + 0.5 - y;
-            // See [`Ellipse::sides`].
-            let to_left = (zero - peak).max(above).min(below);
-            let to_right = peak.max(above).min(below);
-            let width = |height: S::f64s| (narrowing * (square - height * height).max(zero)).sqrt();
-            let low = x + (slope * to_left - width(to_left));
-            let high = x + (slope * to_right + width(to_right));
-            let across_row = Range::<S>::new(low, high, columns);
-            let within = across_row.any & row.simd_le(along.last);
+            // Most have two rows or one.
+            let any = inside & short & row.simd_le(along.last);
+            if !any.any_true() {
+                break;
+            }
+            let (across_row, within) = ellipses.row(simd, row);
             *span = within.select(across_row.span(), zero);
             reached += within.select(across_row.tiles(), zero);
             if number == 0 {
@@ -269,6 +327,60 @@ fn reach_in_lanes<S: Simd>(
         *beside += apart.as_slice()[lane] as u64;
     }
     found
+}
+
+/// The numbers of lanes.
+const NUMBERS: [f64; 8] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
+
+/// The tiles of a lane that [`reach_in_lanes`] calls tall, if it reaches some: several rows at once, in the steps of
+/// [`Ellipse::reach`].
+#[inline(always)]
+fn reach_by_rows<S: Simd>(
+    view: &ViewConstants,
+    simd: S,
+    at: usize,
+    scratch: &Scratch,
+    others: &mut Vec<TileSpan>,
+    beside: &mut u64,
+) -> Option<TileFootprint> {
+    let number = |value: f64| S::f64s::splat(simd, value);
+    let flat = &*scratch.flat;
+    let (x, y) = (number(flat.mean[0][at]), number(flat.mean[1][at]));
+    let (half_x, half_y) = (number(flat.half[0][at]), number(flat.half[1][at]));
+    let columns = both(view.visible.pixels(0), number);
+    let across = Range::<S>::new(x - half_x, x + half_x, columns);
+    let rows = both(view.visible.pixels(1), number);
+    let ellipses = Ellipses::<S> {
+        mean: [x, y],
+        slope: number(flat.slope[at]),
+        narrowing: number(flat.narrowing[at]),
+        peak: number(flat.peak[at]),
+        square: half_y * half_y,
+        along: Range::new(y - half_y, y + half_y, rows),
+        columns,
+    };
+    let along = &ellipses.along;
+    let whole = |value: S::f64s| value.as_slice()[0] as u64;
+    let (first, count) = (whole(along.first), whole(along.tiles()) as usize);
+    let reach = TileFootprint::new(first as u16, count as u16, others);
+    let spans = others.len() - count;
+    let spans = &mut others[spans..];
+    let (zero, point) = (number(0.0), number(POINT));
+    let mut row = along.first + S::f64s::from_slice(simd, &NUMBERS[..S::f64s::LEN]);
+    let mut reached = zero;
+    for spans in spans.chunks_mut(S::f64s::LEN) {
+        let (across_row, within) = ellipses.row(simd, row);
+        let bits: S::u64s = (within.select(across_row.span(), zero) + point).bitcast();
+        for (span, &bits) in spans.iter_mut().zip(bits.as_slice()) {
+            *span = PackedSpan::from_bits(bits as u32).into();
+        }
+        reached += within.select(across_row.tiles(), zero);
+        row += S::f64s::LEN as f64;
+    }
+    let reached = reached.as_slice().iter().sum::<f64>() as u64;
+    let all = count as u64 * whole(across.tiles());
+    *beside += all.saturating_sub(reached);
+    (reached > 0).then_some(reach)
 }
 
 /// The tiles of a lane, if it reaches some.
@@ -415,6 +527,7 @@ mod tests {
                 scratch.depth[at] = depth;
                 scratch.lanes.push(at);
             }
+            scratch.kept = Bits::first(lanes.len());
             let (at, value) = odd;
             let flat = &mut *scratch.flat;
             match at % 4 {

@@ -4,7 +4,7 @@
 use super::camera::ViewConstants;
 use super::depth::CenterDepth;
 use super::footprint::Visible;
-use super::lanes::{GROUP, GroupF64, NO_GROUP_F64};
+use super::lanes::{Bits, GROUP, GroupF64, NO_GROUP_F64};
 use super::preprocess::shape;
 use super::scratch::Scratch;
 use super::set::GaussianSet;
@@ -284,6 +284,7 @@ impl Shading {
             kept.key[at] = key + 0.0;
             scratch.lanes.push(lane);
         }
+        scratch.kept = Bits::first(scratch.lanes.len());
     }
 
     /// Finds mean, covariance and opacity on the screen of the kept Gaussians.

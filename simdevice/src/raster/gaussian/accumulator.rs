@@ -45,6 +45,12 @@ impl TransmittanceBits {
     }
 }
 
+/// Makes the sums of a tile's pixels zero. What is longer would be cleared by instructions that are slow to begin.
+#[inline(never)]
+fn clear_sums(sums: &mut [[f32; BLOCK_PIXELS]; BLOCKS]) {
+    *sums = [[0.0; BLOCK_PIXELS]; BLOCKS];
+}
+
 impl Accumulator {
     pub(super) const EMPTY: Self = Self {
         color: [[[0.0; BLOCK_PIXELS]; BLOCKS]; 3],
@@ -57,7 +63,7 @@ impl Accumulator {
 
     /// Makes the pixels in `lanes` fresh, and the others finished.
     pub(super) fn clear(&mut self, lanes: &PixelMask) {
-        self.color = [[[0.0; BLOCK_PIXELS]; BLOCKS]; 3];
+        self.color.iter_mut().for_each(clear_sums);
         self.covered = [0; BLOCKS];
         for (block, &lanes) in self.transmittance.iter_mut().zip(lanes) {
             if lanes == ALL_LANES {

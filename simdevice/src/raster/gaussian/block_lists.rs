@@ -2,7 +2,7 @@
 
 use super::accumulator::Accumulator;
 use super::depth_ranges::DepthRanges;
-use super::grid::{BLOCKS, ROUND};
+use super::grid::{BLOCKS, BlockMiddles, ROUND};
 use super::inputs::{Kernel, NO_DEPTH, TileCounts, TileInputs};
 use super::staging::StagedSplat;
 use crate::gaussian::splat::{Splat, binary16_headroom, locate};
@@ -94,6 +94,7 @@ pub(super) fn part<S: Simd>(
         list.clear();
     }
     let mut record = StagedSplat::default();
+    let middles = BlockMiddles::new(task.corner);
     let (mut hidden_alone, recorded) = (0, runs.is_some());
     for &primitive in task.list {
         let (batch, place) = locate(primitive);
@@ -115,7 +116,7 @@ pub(super) fn part<S: Simd>(
             _ if !bounded => all,
             Some(surfel) => mask32x16::from_bitmask(simd, surfel.blocks(task.corner)),
             None if splat.needs_f64 => all,
-            None => record.place(simd, splat, task.corner.map(f64::from), most_fall),
+            None => record.place(simd, splat, &middles, most_fall),
         };
         if hidden {
             hidden_alone += reached.to_bitmask().count_ones();

@@ -225,8 +225,9 @@ pub(super) fn falls<S: Simd>(
         return falls_64(simd, splat, task, block);
     };
     let surfel = &surfels[batch][place];
-    let from_mean = |axis: usize| f64::from(task.corner[axis]) - splat.mean[axis];
-    let middle = [BLOCK_X[block] + from_mean(0), BLOCK_Y[block] + from_mean(1)];
+    let from_mean =
+        |axis: usize, block: f64| (f64::from(task.corner[axis]) + block) - splat.mean[axis];
+    let middle = [from_mean(0, BLOCK_X[block]), from_mean(1, BLOCK_Y[block])];
     let opacity = f64x8::splat(simd, splat.log2_opacity.into());
     let fall = |first: usize| {
         let dx = f64x8::from_slice(simd, &LANE_X_64[first..first + 8]) + middle[0];

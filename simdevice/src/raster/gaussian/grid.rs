@@ -26,11 +26,26 @@ pub(super) const LANE_X_64: [f64; BLOCK_PIXELS] = widened(LANE_X);
 pub(super) const LANE_Y_64: [f64; BLOCK_PIXELS] = widened(LANE_Y);
 /// Blocks in a row of them, and rows.
 pub(super) const BLOCKS_ACROSS: usize = 4;
-/// The offsets of the middles of columns of blocks from their tile's corner, and of rows.
-pub(super) const BLOCK_COLUMNS: [f64; BLOCKS_ACROSS] =
-    [BLOCK_X[0], BLOCK_X[1], BLOCK_X[2], BLOCK_X[3]];
-pub(super) const BLOCK_ROWS: [f64; BLOCKS_ACROSS] =
-    [BLOCK_Y[0], BLOCK_Y[4], BLOCK_Y[8], BLOCK_Y[12]];
+/// The middles of a tile's columns of blocks, and of its rows of blocks, in pixels.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct BlockMiddles {
+    pub(super) x: [f64; BLOCKS_ACROSS],
+    pub(super) y: [f64; BLOCKS_ACROSS],
+}
+
+impl BlockMiddles {
+    /// Of the tile at `corner`.
+    #[inline(always)]
+    pub(super) fn new([x, y]: [u32; 2]) -> Self {
+        let [x, y] = [f64::from(x), f64::from(y)];
+        let [first, second, third, fourth] = [BLOCK_X[0], BLOCK_X[1], BLOCK_X[2], BLOCK_X[3]];
+        Self {
+            x: [x + first, x + second, x + third, x + fourth],
+            y: [y + first, y + second, y + third, y + fourth],
+        }
+    }
+}
+
 /// The offset of the middle of each block from its tile's corner.
 pub(super) const BLOCK_X: [f64; BLOCKS] = middles(true);
 pub(super) const BLOCK_Y: [f64; BLOCKS] = middles(false);

@@ -70,23 +70,24 @@ impl Alphas {
             || {
                 let ceiling = f32x16::splat(simd, thresholds.alpha_ceiling);
                 let mut pixels = Tally::new(simd);
-                let mut items = self.alphas.iter_mut();
-                // Two blocks at a time, so that half as many loops end where nobody can foresee it.
-                for (pair, words) in reaching.as_chunks::<2>().0.iter().enumerate() {
-                    let mut rest = u64::from(words[0]) | u64::from(words[1]) << ROUND;
-                    while rest != 0 {
-                        let bit = rest.trailing_zeros() as usize;
-                        rest &= rest - 1;
-                        let (block, number) = ((2 * pair + bit / ROUND) % BLOCKS, bit % ROUND);
+                let mut items = &mut self.alphas[..];
+                for (block, &reaching) in reaching.iter().enumerate() {
+                    let count = reaching.count_ones() as usize;
+                    let Some((alphas, others)) = items.split_at_mut_checked(count) else {
+                        break;
+                    };
+                    items = others;
+                    let most_fall = f32x16::from_slice(simd, &most_fall[block]);
+                    let mut rest = reaching;
+                    for to in alphas {
+                        let number = rest.trailing_zeros() as usize % ROUND;
+                        rest &= rest.wrapping_sub(1);
                         let fall = round.records[number].falls(simd, block);
-                        let most_fall = f32x16::from_slice(simd, &most_fall[block]);
                         let at = (block, round.looks[number].depth);
                         let reached = reached(simd, DEPTH, at, fall, ranges, most_fall);
                         pixels.add(reached);
                         let alpha = alpha(simd, DEPTH, reached, fall, ceiling);
-                        if let Some(to) = items.next() {
-                            alpha.store_slice(to);
-                        }
+                        alpha.store_slice(to);
                     }
                 }
                 pixels.total()
@@ -171,7 +172,7 @@ fn composite_all<S: Simd, const DEPTH: DepthMode>(
                     || DEPTH >= FIND_MEDIAN
                     || !composite_far_from_floor(accumulator, simd, of_block, round, thresholds)
                 {
-                    refused += composite_carefully::<_, DEPTH>(
+                    refused += composite_near_floor::<_, DEPTH>(
                         accumulator,
                         simd,
                         of_block,
@@ -222,6 +223,63 @@ fn composite_far_from_floor<S: Simd>(
     pixels.transmittance = signs.simd_lt(0).select(before, pixels.transmittance);
     keep(accumulator, block, pixels);
     true
+}
+
+/// Composites a block's alphas; returns how many pixels refused one. A function of its own, so that what goes the quick way
+/// has the registers for itself.
+#[inline(never)]
+fn composite_near_floor<S: Simd, const DEPTH: DepthMode>(
+    accumulator: &mut Accumulator,
+    simd: S,
+    (block, mut reaching, mut alphas): (usize, u32, &[[f32; BLOCK_PIXELS]]),
+    round: &StagedRound,
+    thresholds: Thresholds,
+) -> u64 {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            if DEPTH != FIND_REACHED && DEPTH < FIND_MEDIAN {
+                let of_block = (block, &mut reaching, &mut alphas);
+                composite_until_finished(accumulator, simd, of_block, round, thresholds);
+                if alphas.is_empty() {
+                    return 0;
+                }
+            }
+            let of_block = (block, reaching, alphas);
+            composite_carefully::<_, DEPTH>(accumulator, simd, of_block, round, thresholds)
+        },
+    )
+}
+
+/// Composites the first of a block's alphas, up to one that finishes a pixel, and leaves the others.
+#[inline(always)]
+fn composite_until_finished<S: Simd>(
+    accumulator: &mut Accumulator,
+    simd: S,
+    (block, reaching, alphas): (usize, &mut u32, &mut &[[f32; BLOCK_PIXELS]]),
+    round: &StagedRound,
+    thresholds: Thresholds,
+) {
+    let floor = f32x16::splat(simd, thresholds.transmittance_floor);
+    let mut pixels = pixels(accumulator, simd, block);
+    let before = pixels.transmittance;
+    let signs: i32x16<S> = before.bitcast();
+    // What is finished has alphas of zero: here it has light that stays.
+    let light = f32x16::splat(simd, f32::MAX);
+    pixels.transmittance = signs.simd_lt(0).select(light, before);
+    while let [alpha, rest @ ..] = *alphas {
+        let passed = pixels.pass(f32x16::from_slice(simd, alpha));
+        if passed.rest.simd_lt(floor).any_true() {
+            break;
+        }
+        let look = &round.looks[reaching.trailing_zeros() as usize % ROUND];
+        *reaching &= reaching.wrapping_sub(1);
+        *alphas = rest;
+        pixels.transmittance = passed.rest;
+        pixels.add(simd, passed.weight, look.color);
+    }
+    pixels.transmittance = signs.simd_lt(0).select(before, pixels.transmittance);
+    keep(accumulator, block, pixels);
 }
 
 /// Composites a block's alphas; returns how many pixels refused one.
@@ -400,7 +458,8 @@ pub(super) fn falls_64<S: Simd>(
     block: usize,
 ) -> f32x16<S> {
     let [a, b, c] = splat.factor;
-    let from_mean = |axis: usize| f64::from(task.corner[axis]) - splat.mean[axis];
+    let from_mean =
+        |axis: usize, block: f64| (f64::from(task.corner[axis]) + block) - splat.mean[axis];
     let opacity = f64x8::splat(simd, splat.log2_opacity.into());
     let half_period = if splat.exceeds_period {
         task.half_period
@@ -409,7 +468,7 @@ pub(super) fn falls_64<S: Simd>(
     };
     let within = f64x8::splat(simd, half_period);
     let nothing = f64x8::splat(simd, 1e3);
-    let middle = [BLOCK_X[block] + from_mean(0), BLOCK_Y[block] + from_mean(1)];
+    let middle = [from_mean(0, BLOCK_X[block]), from_mean(1, BLOCK_Y[block])];
     let fall = |first: usize| {
         let dx = f64x8::from_slice(simd, &LANE_X_64[first..first + 8]) + middle[0];
         let dy = f64x8::from_slice(simd, &LANE_Y_64[first..first + 8]) + middle[1];

@@ -1,13 +1,11 @@
 //! Phase 1 of the tile kernel: what the others need of a round's Gaussians in a tile, and which blocks each may reach.
 
 use super::depth_ranges::DepthRanges;
-use super::grid::{
-    BLOCK_COLUMNS, BLOCK_PIXELS, BLOCK_ROWS, BLOCKS, BLOCKS_ACROSS, HALF, LANE_X, LANE_Y, ROUND,
-};
+use super::grid::{BLOCK_PIXELS, BLOCKS, BLOCKS_ACROSS, BlockMiddles, HALF, LANE_X, LANE_Y, ROUND};
 use super::inputs::{DepthMode, NO_DEPTH, TileInputs};
 use crate::gaussian::splat::Splat;
 use crate::stats::optimizations::Optimization;
-use fearless_simd::{Simd, f32x8, f32x16, f64x4, i32x16, mask32x16, prelude::*, u32x16};
+use fearless_simd::{Simd, f32x8, f32x16, f64x4, i32x8, i32x16, mask32x16, prelude::*, u32x16};
 
 /// What rounding may do to exponents, relative to them.
 const ROOM_FACTOR: f32 = 1.0 + 1e-5;
@@ -75,19 +73,22 @@ impl StagedRound {
             #[inline(always)]
             || {
                 let mut placed = Placed::default();
-                let corner = task.corner.map(f64::from);
+                let middles = BlockMiddles::new(task.corner);
                 let most_fall = task.thresholds.most_fall;
                 let bounded = task.optimizations.has(Optimization::Blocks);
                 // Masks are not combined here: that would be calls.
                 let open_mask = mask32x16::from_bitmask(simd, open);
                 let open = open_mask.to_vector();
-                let mut reaching = i32x16::splat(simd, 0);
+                let (mut reaching, all) = (i32x16::splat(simd, 0), i32x16::splat(simd, -1));
                 let mut number = from;
+                // The Gaussian's bit in words; the first one's comes back after the last one's.
+                let mut bit = i32x8::splat(simd, 1 << (from % ROUND));
                 while let Some(&primitive) = round.get(number) {
                     task.prefetch(next.get(number));
                     let splat = task.splat(primitive);
                     if DEPTH > NO_DEPTH && ranges.hides(splat.depth) {
                         number += 1;
+                        bit += bit;
                         placed.tiles_hidden += 1;
                         if is_recorded {
                             placed.blocks_of_hidden += hidden_blocks(simd, splat, task, open_mask);
@@ -99,27 +100,25 @@ impl StagedRound {
                     }
                     let at = number % ROUND;
                     number += 1;
-                    let reached = self.records[at].place(simd, splat, corner, most_fall);
+                    let reached = self.records[at].place(simd, splat, &middles, most_fall);
                     self.looks[at] = SplatColor {
                         color: splat.color,
                         depth: splat.depth,
                     };
                     placed.count += 1;
-                    let mut reached = if bounded {
-                        reached.to_vector() & open
-                    } else {
-                        open
-                    };
+                    let mut reached = if bounded { reached.to_vector() } else { all };
                     if DEPTH > NO_DEPTH {
+                        reached &= open;
                         let shown = ranges.blocks(simd, splat.depth).to_vector();
                         let hidden = (reached & (shown ^ -1)).simd_lt(0).to_bitmask();
                         placed.blocks_hidden += u64::from(hidden.count_ones());
                         reached &= shown;
                     }
-                    reaching |= reached & (1 << at);
+                    reaching |= reached & bit.combine(bit);
+                    bit += bit;
                 }
                 placed.end = number;
-                placed.reaching = reaching.bitcast::<u32x16<S>>().to_array();
+                placed.reaching = (reaching & open).bitcast::<u32x16<S>>().to_array();
                 placed
             },
         )
@@ -127,20 +126,19 @@ impl StagedRound {
 }
 
 impl StagedSplat {
-    /// Makes this the record of `splat` in the tile at `corner`. Returns which blocks it may reach.
+    /// Makes this the record of `splat` in a tile. Returns which blocks it may reach.
     #[inline(always)]
     pub(super) fn place<S: Simd>(
         &mut self,
         simd: S,
         splat: &Splat,
-        corner: [f64; 2],
+        middles: &BlockMiddles,
         most_fall: f32,
     ) -> mask32x16<S> {
         let [a, b, c] = splat.factor;
-        let (from_x, from_y) = (corner[0] - splat.mean[0], corner[1] - splat.mean[1]);
         // In each column of blocks, and each row.
-        let dx = f64x4::simd_from(simd, BLOCK_COLUMNS) + from_x;
-        let dy = f64x4::simd_from(simd, BLOCK_ROWS) + from_y;
+        let dx = f64x4::from_slice(simd, &middles.x) - splat.mean[0];
+        let dy = f64x4::from_slice(simd, &middles.y) - splat.mean[1];
         let (u, sheared, sunk) = (dx * a, dx * b, dy * c);
         let row = |row: usize| sheared + f64x4::splat(simd, sunk[row]);
         let u: f32x8<S> = u.narrow(u);
@@ -190,7 +188,8 @@ pub(super) fn hidden_blocks<S: Simd>(
     let bounded = task.optimizations.has(Optimization::Blocks) && !splat.needs_f64;
     let reached = if bounded {
         let most_fall = task.thresholds.most_fall;
-        open & StagedSplat::default().place(simd, splat, task.corner.map(f64::from), most_fall)
+        let middles = BlockMiddles::new(task.corner);
+        open & StagedSplat::default().place(simd, splat, &middles, most_fall)
     } else {
         open
     };

@@ -232,7 +232,7 @@ fn naive_sample(
         let (batch, place) = locate(primitive);
         let g = &draw.sorted.splats[batch][place];
         let middle = |at: usize, corner: u32, mean: f64| {
-            (4 * (at / 4)) as f64 + 2.0 + (f64::from(corner) - mean)
+            ((4 * (at / 4)) as f64 + 2.0 + f64::from(corner)) - mean
         };
         let (mx, my) = (
             middle(x, corner[0], g.mean[0]),

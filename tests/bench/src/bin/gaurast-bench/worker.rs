@@ -153,6 +153,9 @@ pub struct Worker {
 /// A worker that was not asked for so long is warmed up again.
 const PAUSE: Duration = Duration::from_millis(100);
 
+/// The counter of the time in which clusters are made.
+const CLUSTER_TIME: &str = "clusters";
+
 /// What this driver leaves out in benchmarks: all but what only saves where two frames are the same.
 pub const OPTIMIZATIONS: &str = "all,-temporal-reuse";
 
@@ -325,16 +328,21 @@ pub fn run() -> Result<(), BenchError> {
     };
     usage::reset_peak_memory();
     let (mut last_size, mut last_end) = ([0; 2], Instant::now());
+    let mut made_clusters = false;
     for (number, line) in lines.enumerate() {
         let request: Request = serde_json::from_str(&line?)?;
         let size = [request.camera.width, request.camera.height];
         // A picture of another size than the last one has new memory, which one thread touches for the first time; and after a
         // pause, as when others had their turn, schedulers leave threads together on one processor for as long as a frame
-        // takes. Neither is part of what a frame takes, but of the first two: the cold one, and the one that makes chunks.
-        let is_new = size != last_size || last_end.elapsed() > PAUSE;
+        // takes. Neither is part of what a frame takes, nor are the clusters that a frame makes, but of the first two: the cold
+        // one, and the first that makes some.
+        let is_new = size != last_size || last_end.elapsed() > PAUSE || made_clusters;
         let warms_up = request.is_independent && number >= 2 && is_new;
         let reply = match artist.answer(&request, warms_up) {
-            Ok(drawn) => Reply::Drawn(drawn),
+            Ok(drawn) => {
+                made_clusters = drawn.counter(CLUSTER_TIME) > 0.0;
+                Reply::Drawn(drawn)
+            }
             Err(error) => Reply::Failed(error.to_string()),
         };
         say(&mut stdout(), &reply)?;
@@ -376,10 +384,13 @@ impl Artist {
         Ok((artist, Ready { device, upload }))
     }
 
-    /// Draws what is asked for, once before if it is to `warm_up`.
+    /// Draws what is asked for; if it is to `warm_up`, also before, until a frame makes no clusters.
     fn answer(&mut self, request: &Request, warm_up: bool) -> Result<Drawn, BenchError> {
-        if warm_up {
-            self.draw(&request.camera, request.settings)?;
+        while warm_up {
+            let before = self.draw(&request.camera, request.settings)?;
+            if describe(&before).counter(CLUSTER_TIME) == 0.0 {
+                break;
+            }
         }
         let frame = self.draw(&request.camera, request.settings)?;
         if let Some(path) = &request.picture {

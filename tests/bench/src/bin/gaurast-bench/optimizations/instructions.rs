@@ -17,8 +17,8 @@ const SIZE: [u32; 2] = [640, 360];
 /// Gaussians of a scene.
 const COUNT: usize = 100_000;
 
-/// The frame that makes chunks is the second one; they serve the third.
-const WARM: usize = 3;
+/// The frames from the second one on make clusters, a piece each; they serve this one.
+const WARM: usize = 6;
 
 /// What a scene draws.
 #[derive(Clone)]
