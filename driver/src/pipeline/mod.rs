@@ -8,9 +8,10 @@ pub(crate) mod gaussian;
 pub(crate) mod layout;
 mod link;
 pub(crate) mod primitives;
-mod reflect;
 mod stages;
 pub(crate) mod state;
+#[cfg(test)]
+mod tests;
 
 use self::compute::ComputePipeline;
 use self::gaussian::GaussianPipeline;
