@@ -3,13 +3,6 @@
 
 use core::ffi::{CStr, c_void};
 
-use ash::vk::{
-    ExtendsDeviceCreateInfo, ExtendsGraphicsPipelineCreateInfo, ExtendsPhysicalDeviceFeatures2,
-    ExtendsPhysicalDeviceProperties2, StructureType, TaggedStructure,
-};
-
-use crate::vk::*;
-
 /// Declares a Vulkan enum as ash does: a transparent `i32`, a constant per value, and a `Debug`
 /// that prints the value's name, or its number where it has none.
 macro_rules! vk_enum {
@@ -50,16 +43,49 @@ macro_rules! vk_enum {
 }
 pub(crate) use vk_enum;
 
-/// Writes ash's by-value setters, one for each named field. A field marked `bool` is a `Bool32`.
-macro_rules! setters {
-    ($($field:ident: bool,)*) => {$(
-        #[doc = concat!("Sets [`", stringify!($field), "`](Self#structfield.", stringify!($field), ").")]
-        #[inline]
-        pub fn $field(mut self, $field: bool) -> Self {
-            self.$field = $field.into();
-            self
+/// Declares Vulkan flags as ash does: transparent, a constant per bit, set operations, and a `Debug` that prints the
+/// names of the bits that are set, and the number that the bits without a name are.
+macro_rules! vk_flags {
+    (
+        $(#[$meta:meta])*
+        pub struct $name:ident { $($(#[$value_meta:meta])* $value:ident = $raw:expr,)* }
+    ) => {
+        $(#[$meta])*
+        #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        #[repr(transparent)]
+        pub struct $name(ash::vk::Flags);
+
+        #[expect(missing_docs, reason = "ash's macro leaves what it writes undocumented")]
+        const _: () = {
+            ash::vk_bitflags_wrapped!($name, ash::vk::Flags);
+        };
+
+        impl $name {
+            $($(#[$value_meta])* pub const $value: Self = Self($raw);)*
         }
-    )*};
+
+        impl core::fmt::Debug for $name {
+            fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+                let mut unnamed = *self;
+                let mut separator = "";
+                $(if self.contains(Self::$value) {
+                    unnamed &= !Self::$value;
+                    write!(f, "{separator}{}", stringify!($value))?;
+                    separator = " | ";
+                })*
+                if unnamed.is_empty() {
+                    Ok(())
+                } else {
+                    write!(f, "{separator}{:b}", unnamed.0)
+                }
+            }
+        }
+    };
+}
+pub(crate) use vk_flags;
+
+/// Writes ash's by-value setters, one for each named field.
+macro_rules! setters {
     ($($field:ident: $type:ty,)*) => {$(
         #[doc = concat!("Sets [`", stringify!($field), "`](Self#structfield.", stringify!($field), ").")]
         #[inline]
@@ -71,14 +97,27 @@ macro_rules! setters {
 }
 pub(crate) use setters;
 
+/// Writes the setters of fields that are a `Bool32`, each of which takes a `bool`.
+macro_rules! bool_setters {
+    ($($field:ident,)*) => {$(
+        #[doc = concat!("Sets [`", stringify!($field), "`](Self#structfield.", stringify!($field), ").")]
+        #[inline]
+        pub fn $field(mut self, $field: bool) -> Self {
+            self.$field = $field.into();
+            self
+        }
+    )*};
+}
+pub(crate) use bool_setters;
+
 /// Makes a `repr(C)` structure that starts with `s_type` and `p_next` one that ash can chain: gives
 /// it its structure type, the structures that it extends, and the thread safety of ash's own.
 macro_rules! tagged_structure {
     ($name:ident = $s_type:expr $(, $extends:ident)*) => {
         // SAFETY: the structure is `repr(C)` and starts with `s_type` and `p_next`, as
         // `BaseOutStructure` does; `Default` and the setters keep `s_type` at this value.
-        unsafe impl TaggedStructure for $name<'_> {
-            const STRUCTURE_TYPE: StructureType = $s_type;
+        unsafe impl ash::vk::TaggedStructure for $name<'_> {
+            const STRUCTURE_TYPE: ash::vk::StructureType = $s_type;
         }
         // SAFETY: the structure is plain data; `p_next` is only followed by Vulkan calls, which are
         // unsafe and state their own synchronisation.
@@ -87,33 +126,12 @@ macro_rules! tagged_structure {
         unsafe impl Sync for $name<'_> {}
         $(
             // SAFETY: the extension lets the structure be chained there.
-            unsafe impl $extends for $name<'_> {}
+            unsafe impl ash::vk::$extends for $name<'_> {}
         )*
     };
 }
 
-tagged_structure!(
-    PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST =
-        STRUCTURE_TYPE_PHYSICAL_DEVICE_GAUSSIAN_PRIMITIVE_TOPOLOGY_FEATURES_GAURAST,
-    ExtendsPhysicalDeviceFeatures2,
-    ExtendsDeviceCreateInfo
-);
-tagged_structure!(
-    PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST =
-        STRUCTURE_TYPE_PHYSICAL_DEVICE_GAUSSIAN_PRIMITIVE_TOPOLOGY_PROPERTIES_GAURAST,
-    ExtendsPhysicalDeviceProperties2
-);
-tagged_structure!(
-    PipelineGaussianStateCreateInfoGAURAST =
-        STRUCTURE_TYPE_PIPELINE_GAUSSIAN_STATE_CREATE_INFO_GAURAST,
-    ExtendsGraphicsPipelineCreateInfo
-);
-tagged_structure!(
-    PipelineGaussianApproximationStateCreateInfoGAURAST =
-        STRUCTURE_TYPE_PIPELINE_GAUSSIAN_APPROXIMATION_STATE_CREATE_INFO_GAURAST,
-    ExtendsGraphicsPipelineCreateInfo
-);
-tagged_structure!(GaussianCameraGAURAST = STRUCTURE_TYPE_GAUSSIAN_CAMERA_GAURAST);
+pub(crate) use tagged_structure;
 
 /// A loader of `device`'s functions, for [`DeviceFn::load`].
 ///
@@ -127,26 +145,5 @@ pub(crate) fn device_loader(
         // is a terminated string.
         let function = unsafe { instance.get_device_proc_addr(device, name.as_ptr()) };
         function.map_or(core::ptr::null(), |function| function as *const c_void)
-    }
-}
-
-/// Loads `vkCmdSetGaussianCameraGAURAST`, or a function that ends the process, as ash does.
-pub(crate) fn load_cmd_set_gaussian_camera(
-    load: &mut dyn FnMut(&CStr) -> *const c_void,
-) -> PFN_vkCmdSetGaussianCameraGAURAST {
-    unsafe extern "system" fn missing(
-        _command_buffer: ash::vk::CommandBuffer,
-        _p_camera: *const GaussianCameraGAURAST<'_>,
-    ) {
-        panic!("Unable to load cmd_set_gaussian_camera_gaurast")
-    }
-    let function = load(c"vkCmdSetGaussianCameraGAURAST");
-    if function.is_null() {
-        missing
-    } else {
-        // SAFETY: the loader returns the function of that name, which has this type.
-        unsafe {
-            core::mem::transmute::<*const c_void, PFN_vkCmdSetGaussianCameraGAURAST>(function)
-        }
     }
 }

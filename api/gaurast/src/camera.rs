@@ -7,7 +7,7 @@
 
 use core::fmt;
 
-use crate::vk::{GaussianCameraGAURAST, GaussianCameraModelGAURAST};
+use crate::vk::{GaussianCameraDataGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST};
 
 /// How far a matrix may be from the form that a helper asks for: room for matrices composed in
 /// binary32, none for anything that would show.
@@ -49,6 +49,23 @@ impl fmt::Display for CameraError {
 }
 
 impl core::error::Error for CameraError {}
+
+impl From<&GaussianCameraGAURAST<'_>> for GaussianCameraDataGAURAST {
+    fn from(camera: &GaussianCameraGAURAST<'_>) -> Self {
+        let [xx, xy, xz, yx, yy, yz, zx, zy, zz] = camera.rotation;
+        Self {
+            eye: camera.eye,
+            model: camera.model,
+            reserved: 0,
+            rotation: [[xx, xy, xz, 0.0], [yx, yy, yz, 0.0], [zx, zy, zz, 0.0]],
+            focal_length: camera.focal_length,
+            principal_point: camera.principal_point,
+            depth_coefficients: camera.depth_coefficients,
+            near_plane: camera.near_plane,
+            far_plane: camera.far_plane,
+        }
+    }
+}
 
 impl GaussianCameraGAURAST<'_> {
     /// The camera of a right-handed view matrix, which looks along -z with +y up (OpenGL's

@@ -1,7 +1,8 @@
 //! Declarations of ash, and of gaurast beside it: the Rust names and types of the registry's things.
 
 use crate::error::Error;
-use crate::registry::{self, Registry};
+use crate::registry::Registry;
+use crate::{File, rust};
 use proc_macro2::{Group, TokenStream, TokenTree};
 use quote::ToTokens;
 use std::collections::HashMap;
@@ -44,33 +45,31 @@ pub struct Function {
 }
 
 impl Declarations {
-    /// Reads the sources of ash, which `cargo metadata` finds, and of gaurast, in `api/`.
+    /// Reads the sources of ash, which `cargo metadata` finds, and the definitions of gaurast, which are given.
     ///
     /// # Errors
     /// [`Error::Program`] where cargo doesn't know ash, [`Error::File`] and [`Error::Rust`] where its source isn't as
     /// expected.
-    pub fn read(root: &Path) -> Result<Self, Error> {
+    pub fn read(root: &Path, gaurast: &File) -> Result<Self, Error> {
         let ash = ash_folder(root)?.join("src/vk");
-        let api = root.join("api/gaurast/src");
-        let files = [
-            ash.join("definitions.rs"),
-            ash.join("features.rs"),
-            ash.join("extensions.rs"),
-            api.join("vk.rs"),
-            api.join("vk/physical_device.rs"),
-        ];
         let mut declarations = Self::default();
-        for path in files {
-            let text = registry::read(&path)?;
-            let file = syn::parse_file(&text).map_err(|source| Error::Rust { path, source })?;
-            file.items
-                .into_iter()
-                .for_each(|item| declarations.add(item));
+        for name in ["definitions.rs", "features.rs", "extensions.rs"] {
+            declarations.add(rust::parse(&ash.join(name))?);
         }
+        declarations.add(
+            syn::parse_file(&gaurast.text).map_err(|source| Error::Rust {
+                path: gaurast.path.into(),
+                source,
+            })?,
+        );
         Ok(declarations)
     }
 
-    fn add(&mut self, item: syn::Item) {
+    fn add(&mut self, file: syn::File) {
+        file.items.into_iter().for_each(|item| self.add_item(item));
+    }
+
+    fn add_item(&mut self, item: syn::Item) {
         match item {
             syn::Item::Struct(item) => {
                 let name = item.ident.to_string();

@@ -1,14 +1,17 @@
 //! Writes `dispatch/commands.rs`: the functions that Vulkan calls, around the driver's own, and the table of them.
 //!
-//! A function of the driver's takes those of its command's parameters that it wants, by their names without `p_`, and each
-//! in the form that it declares: the command's own type; a handle as the object (`&Buffer`, `&Arc<Buffer>`,
+//! A function of the driver's takes those of its command's parameters that it wants, by their names without `p_`, or of the
+//! members of the structure that one points at, and each in the form that it declares: the command's own type; a handle as the object (`&Buffer`, `&Arc<Buffer>`,
 //! `Option<&Buffer>`, or, to be destroyed, `Option<Arc<Buffer>>`); a pointer as what it points at (`&T`, `&mut T`,
 //! `Option<&T>`, `&[T]`, `&[Arc<Buffer>]`, `&CStr`, `&mut [MaybeUninit<T>]`, `OutputChain<'_, T>`, and with its count
-//! `Structures<'_, T>`); a `VkBool32` as a `bool`; a command buffer as its `recorder`; and `&Commands`, the table. An output
+//! `Structures<'_, T>`); a `VkBool32` as a `bool`; a command buffer as its `recorder`; a structure of the chain as `Option<&T>`; and `&Commands`,
+//! the table. An output
 //! pointer that it doesn't take is written with what it returns: a value, an `Arc` of an object, or a list. Of commands that
-//! have a second version, which takes a structure of the first one's parameters, the second is enough.
+//! have a second version, which takes a structure of the first one's parameters, the second is enough. A command that does
+//! nothing but set a dynamic state whose value is its parameter needs no function at all.
 
-use crate::ash::{Declarations, Function, Member};
+use crate::ash::{self, Declarations, Function, Member};
+use crate::dynamic_states;
 use crate::entry_points::EntryPoint;
 use crate::error::Error;
 use crate::registry::{self, Registry};
@@ -53,6 +56,7 @@ struct Writer<'a> {
     declarations: &'a Declarations,
     support: &'a Support,
     entry_points: &'a BTreeMap<String, EntryPoint>,
+    dynamic_states: &'a BTreeMap<String, dynamic_states::Row>,
 }
 
 pub(crate) fn write(
@@ -60,12 +64,14 @@ pub(crate) fn write(
     declarations: &Declarations,
     support: &Support,
     entry_points: &BTreeMap<String, EntryPoint>,
+    dynamic_states: &BTreeMap<String, dynamic_states::Row>,
 ) -> Result<String, Error> {
     let writer = Writer {
         registry,
         declarations,
         support,
         entry_points,
+        dynamic_states,
     };
     let rows = rows(registry, support)?;
     for command in entry_points.keys() {
@@ -93,6 +99,7 @@ pub(crate) fn write(
             use crate::abi::handle;
             use crate::abi::valid::{{self, OutputChain, Structures}};
             use crate::command::buffer::record;
+            use crate::pipeline::dynamic_state::DynamicState;
             use ash::vk;
 
 {}
@@ -197,10 +204,13 @@ impl Writer<'_> {
     ) -> Result<String, Error> {
         let mut used = BTreeSet::from([function.parameters[0].name.clone()]);
         let body = match entry_point {
-            Some(entry_point) => call(name, definition, function, entry_point, &mut used)?,
+            Some(entry_point) => self.call(name, definition, function, entry_point, &mut used)?,
             None => match self.by_second_version(name, definition, function, &mut used)? {
                 Some(body) => body,
-                None => self.without_function(name, function, &mut used)?,
+                None => match self.dynamic_state(name, function, &mut used) {
+                    Some(body) => body,
+                    None => self.without_function(name, function, &mut used)?,
+                },
             },
         };
         let mut parameters = String::new();
@@ -289,19 +299,69 @@ impl Writer<'_> {
             );
             let _ = writeln!(members, "{name}: {list}.as_ptr(),");
         }
+        let info = Info::new(self, "info", &info.ty)?;
+        let mut arguments = Vec::new();
+        for parameter in &entry_point.parameters {
+            arguments.push(match parameter.name.as_str() {
+                "recorder" | "_recorder" => "recorder".to_owned(),
+                _ if plain(&parameter.ty) == format!("&{}", plain(&structure.ty)) => {
+                    "&info".to_owned()
+                }
+                _ => match info.argument(self, parameter) {
+                    Some((argument, _)) => argument,
+                    None => return Ok(None),
+                },
+            });
+        }
         Ok(Some(format!(
             "// SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
             unsafe {{
                 record({first}, \"{name}\", |recorder| {{
                     {lists}
                     let info = {ty} {{ {members} ..Default::default() }};
-                    {path}(recorder, &info)
+                    {path}({arguments})
                 }})
             }}",
             first = function.parameters[0].name,
             ty = structure.ty.trim_end_matches("<'_>"),
             path = entry_point.path,
+            arguments = arguments.join(", "),
         )))
+    }
+
+    /// The body of a command that sets a dynamic state whose value is its parameter.
+    fn dynamic_state(
+        &self,
+        name: &str,
+        function: &Function,
+        used: &mut BTreeSet<String>,
+    ) -> Option<String> {
+        let untagged = name.trim_end_matches(|letter: char| letter.is_ascii_uppercase());
+        let row = self.dynamic_states.get(untagged)?;
+        let (first, parameters) = function.parameters.split_first()?;
+        let (set, value) = match parameters {
+            [mask, value] if row.is_of_face => {
+                used.insert(mask.name.clone());
+                (format!("set_faces(recorder, {}, |face| ", mask.name), value)
+            }
+            [value] if !row.is_of_face => ("set(recorder, ".to_owned(), value),
+            _ => return None,
+        };
+        used.insert(value.name.clone());
+        let field = &row.value;
+        let converted = convert_value(&row.ty, value)?;
+        let face = if row.is_of_face { "face," } else { "" };
+        Some(format!(
+            "// SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {{
+                record({first}, \"{name}\", |recorder| {{
+                    let {field} = {converted};
+                    crate::command::dynamic_state::{set}DynamicState::{variant} {{ {face} {field} }})
+                }})
+            }}",
+            first = first.name,
+            variant = row.variant,
+        ))
     }
 
     /// The body of a command that the driver has no function of.
@@ -353,6 +413,196 @@ impl Writer<'_> {
              it does nothing"
         )))
     }
+
+    /// The body of a command that calls the driver's function of it.
+    fn call(
+        &self,
+        name: &str,
+        definition: &registry::Command,
+        function: &Function,
+        entry_point: &EntryPoint,
+        used: &mut BTreeSet<String>,
+    ) -> Result<String, Error> {
+        let wrong = |text: String| Error::EntryPoint(format!("{}: {text}", entry_point.path));
+        let mut is_unsafe = entry_point.is_unsafe;
+        let mut arguments = Vec::new();
+        let mut records = false;
+        let mut info = None;
+        for parameter in &entry_point.parameters {
+            if matches!(parameter.name.as_str(), "recorder" | "_recorder") {
+                records = true;
+                arguments.push("recorder".to_owned());
+                continue;
+            }
+            if plain(&parameter.ty) == "&Commands" {
+                arguments.push("&COMMANDS".to_owned());
+                continue;
+            }
+            let index = function.parameters.iter().position(|declared| {
+                without_prefix(&declared.name) == parameter.name.trim_start_matches('_')
+            });
+            let Some(index) = index else {
+                let found = self.info(definition, function);
+                let argument = found
+                    .as_ref()
+                    .and_then(|(_, info)| info.argument(self, parameter));
+                let (Some((pointer, _)), Some((argument, converts))) = (found, argument) else {
+                    return Err(wrong(format!(
+                        "{name} has no parameter {}, but {}",
+                        parameter.name,
+                        list_names(&function.parameters)
+                    )));
+                };
+                is_unsafe |= converts;
+                info = Some(pointer);
+                arguments.push(argument);
+                continue;
+            };
+            let declared = &function.parameters[index];
+            let count = count(definition, function, index);
+            let (argument, converts) = convert(&parameter.ty, declared, count.as_ref())
+                .ok_or_else(|| {
+                    wrong(format!(
+                        "{} of type {} is not made of {}",
+                        parameter.name, parameter.ty, declared.ty
+                    ))
+                })?;
+            is_unsafe |= converts;
+            used.insert(declared.name.clone());
+            if let Some(count) = count.filter(|count| argument.contains(&count.expression)) {
+                used.insert(count.parameter);
+            }
+            arguments.push(argument);
+        }
+        let call = format!("{}({})", entry_point.path, arguments.join(", "));
+        let input = info.map_or_else(String::new, |pointer| {
+            used.insert(pointer.clone());
+            is_unsafe = true;
+            format!("let info = valid::input({pointer})?;")
+        });
+        let body = if records {
+            is_unsafe = true;
+            let call = if input.is_empty() {
+                call
+            } else {
+                format!("{{ {input} {call} }}")
+            };
+            format!(
+                "record({}, \"{name}\", |recorder| {call})",
+                function.parameters[0].name
+            )
+        } else {
+            let (body, writes) = write_output(&entry_point.output, function, used, call)
+                .ok_or_else(|| wrong(format!("nothing takes a {}", entry_point.output)))?;
+            is_unsafe |= writes;
+            format!("{input} {body}")
+        };
+        Ok(if is_unsafe {
+            format!(
+                "// SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+                unsafe {{ {body} }}"
+            )
+        } else {
+            body
+        })
+    }
+
+    /// The structure that a command's parameters lie in, and the parameter that points at it.
+    fn info<'s>(
+        &'s self,
+        definition: &'s registry::Command,
+        function: &Function,
+    ) -> Option<(String, Info<'s>)> {
+        let parameters = std::iter::zip(&definition.parameters, &function.parameters);
+        parameters
+            .filter(|(defined, declared)| {
+                defined.len.is_none() && declared.ty.starts_with("* const")
+            })
+            .find_map(|(defined, declared)| {
+                let info = Info::new(self, "info", &defined.ty).ok()?;
+                Some((declared.name.clone(), info))
+            })
+    }
+}
+
+/// A structure that holds what are parameters of the driver's function.
+struct Info<'a> {
+    /// The variable that refers to it.
+    variable: &'static str,
+    /// Its name in the registry.
+    name: &'a str,
+    structure: &'a registry::Structure,
+    /// Its declaration, whose members are in the same order.
+    declared: &'a ash::Structure,
+}
+
+impl<'a> Info<'a> {
+    fn new(writer: &'a Writer<'_>, variable: &'static str, name: &'a str) -> Result<Self, Error> {
+        let Writer {
+            registry,
+            declarations,
+            ..
+        } = writer;
+        let undeclared = || Error::Undeclared(name.to_owned());
+        let last = registry.type_name(name);
+        let structure = registry.structures.get(last).ok_or_else(undeclared)?;
+        let declared = declarations.structure(registry, name)?;
+        if structure.members.len() != declared.members.len() {
+            return Err(undeclared());
+        }
+        Ok(Self {
+            variable,
+            name: last,
+            structure,
+            declared,
+        })
+    }
+
+    /// A member, or a structure of the chain, in the form that a parameter of the driver's function has; and if that is
+    /// unsafe.
+    fn argument(&self, writer: &Writer<'_>, wanted: &Member) -> Option<(String, bool)> {
+        let variable = self.variable;
+        let place = |index: usize| format!("{variable}.{}", self.declared.members[index].name);
+        let name = wanted.name.trim_start_matches('_');
+        let members = &self.declared.members;
+        if let Some(index) = members.iter().position(|m| without_prefix(&m.name) == name) {
+            let len = self.structure.members[index].len.as_deref();
+            let count = self
+                .structure
+                .members
+                .iter()
+                .position(|m| Some(&*m.name) == len);
+            let count = count.map(|count| Count {
+                parameter: variable.to_owned(),
+                expression: place(count),
+                ty: plain(&members[count].ty),
+            });
+            let member = Member {
+                name: place(index),
+                ty: members[index].ty.clone(),
+            };
+            return convert(&wanted.ty, &member, count.as_ref());
+        }
+        let ty = plain(&wanted.ty);
+        let chained = ty.strip_prefix("Option<&")?.strip_suffix('>')?;
+        let chained = format!("Vk{chained}");
+        let structure = writer
+            .registry
+            .structures
+            .get(writer.registry.type_name(&chained))?;
+        let extends = structure.extends.iter().any(|base| base == self.name);
+        let declared = writer
+            .declarations
+            .structure(writer.registry, &chained)
+            .ok()?;
+        extends.then(|| {
+            let ty = &declared.ty;
+            (
+                format!("valid::find_in_chain::<{ty}>({variable}.p_next)"),
+                true,
+            )
+        })
+    }
 }
 
 /// The condition under which a command may be looked up.
@@ -378,80 +628,6 @@ fn plain(ty: &str) -> String {
         .replace("'_", "")
         // The length of an array.
         .replace("usize]", "]")
-}
-
-/// The body of a command that calls the driver's function of it.
-fn call(
-    name: &str,
-    definition: &registry::Command,
-    function: &Function,
-    entry_point: &EntryPoint,
-    used: &mut BTreeSet<String>,
-) -> Result<String, Error> {
-    let wrong = |text: String| Error::EntryPoint(format!("{}: {text}", entry_point.path));
-    let mut is_unsafe = entry_point.is_unsafe;
-    let mut arguments = Vec::new();
-    let mut records = false;
-    for parameter in &entry_point.parameters {
-        if matches!(parameter.name.as_str(), "recorder" | "_recorder") {
-            records = true;
-            arguments.push("recorder".to_owned());
-            continue;
-        }
-        if plain(&parameter.ty) == "&Commands" {
-            arguments.push("&COMMANDS".to_owned());
-            continue;
-        }
-        let index = function
-            .parameters
-            .iter()
-            .position(|declared| {
-                without_prefix(&declared.name) == parameter.name.trim_start_matches('_')
-            })
-            .ok_or_else(|| {
-                wrong(format!(
-                    "{name} has no parameter {}, but {}",
-                    parameter.name,
-                    list_names(&function.parameters)
-                ))
-            })?;
-        let declared = &function.parameters[index];
-        let count = count(definition, function, index);
-        let (argument, converts) =
-            convert(&parameter.ty, declared, count.as_ref()).ok_or_else(|| {
-                wrong(format!(
-                    "{} of type {} is not made of {}",
-                    parameter.name, parameter.ty, declared.ty
-                ))
-            })?;
-        is_unsafe |= converts;
-        used.insert(declared.name.clone());
-        if let Some(count) = count.filter(|count| argument.contains(&count.expression)) {
-            used.insert(count.parameter);
-        }
-        arguments.push(argument);
-    }
-    let call = format!("{}({})", entry_point.path, arguments.join(", "));
-    let body = if records {
-        is_unsafe = true;
-        format!(
-            "record({}, \"{name}\", |recorder| {call})",
-            function.parameters[0].name
-        )
-    } else {
-        let (body, writes) = write_output(&entry_point.output, function, used, call)
-            .ok_or_else(|| wrong(format!("nothing takes a {}", entry_point.output)))?;
-        is_unsafe |= writes;
-        body
-    };
-    Ok(if is_unsafe {
-        format!(
-            "// SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {{ {body} }}"
-        )
-    } else {
-        body
-    })
 }
 
 fn without_prefix(name: &str) -> &str {
@@ -555,6 +731,8 @@ fn convert(wanted: &str, declared: &Member, count: Option<&Count>) -> Option<(St
                 format!("valid::slice({name}.cast::<u8>(), {count})?")
             } else if wanted.starts_with("&[Arc<") {
                 format!("&handle::get_all({slice})?")
+            } else if wanted.starts_with("&[Option<Arc<") {
+                format!("&handle::get_all_optional({slice})?")
             } else if wanted == format!("Option<&[{pointee}]>") {
                 format!("(!{name}.is_null()).then(|| valid::slice({name}, {count})).transpose()?")
             } else {
@@ -573,6 +751,21 @@ fn convert(wanted: &str, declared: &Member, count: Option<&Count>) -> Option<(St
         return None;
     };
     Some((conversion, true))
+}
+
+/// A parameter as the value of a dynamic state; stencil masks are as wide as stencil texels.
+fn convert_value(wanted: &str, declared: &Member) -> Option<String> {
+    let (ty, raw, name) = (plain(wanted), plain(&declared.ty), &declared.name);
+    if raw.strip_prefix("*const") == Some(&ty) {
+        return Some(format!("*valid::input({name})?"));
+    }
+    if ty == "u8" && raw == "u32" {
+        return Some(format!("{name} as u8"));
+    }
+    match convert(wanted, declared, None)? {
+        (value, false) => Some(value),
+        _ => None,
+    }
 }
 
 /// A call whose result goes where the command's output does; and if that is unsafe.

@@ -2,9 +2,9 @@
 
 use crate::ash::{Member, type_text};
 use crate::error::Error;
-use crate::registry;
+use crate::rust;
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// The folder of the driver's modules.
 const FOLDER: &str = "driver/src";
@@ -29,12 +29,8 @@ pub(crate) struct EntryPoint {
 pub(crate) fn find(root: &Path) -> Result<BTreeMap<String, EntryPoint>, Error> {
     let folder = root.join(FOLDER);
     let mut found = BTreeMap::new();
-    for path in source_files(&folder)? {
-        let text = registry::read(&path)?;
-        let file = syn::parse_file(&text).map_err(|source| Error::Rust {
-            path: path.clone(),
-            source,
-        })?;
+    for path in rust::source_files(&folder)? {
+        let file = rust::parse(&path)?;
         let module = module(path.strip_prefix(&folder).unwrap_or(&path));
         for item in file.items {
             let syn::Item::Fn(function) = item else {
@@ -52,29 +48,6 @@ pub(crate) fn find(root: &Path) -> Result<BTreeMap<String, EntryPoint>, Error> {
         }
     }
     Ok(found)
-}
-
-/// The files of a folder and of those in it, in order.
-fn source_files(folder: &Path) -> Result<Vec<PathBuf>, Error> {
-    let failed = |source| Error::File {
-        path: folder.to_owned(),
-        source,
-    };
-    let mut entries = std::fs::read_dir(folder)
-        .map_err(failed)?
-        .map(|entry| entry.map(|entry| entry.path()))
-        .collect::<Result<Vec<_>, _>>()
-        .map_err(failed)?;
-    entries.sort();
-    let mut files = Vec::new();
-    for path in entries {
-        if path.is_dir() {
-            files.extend(source_files(&path)?);
-        } else if path.extension().is_some_and(|extension| extension == "rs") {
-            files.push(path);
-        }
-    }
-    Ok(files)
 }
 
 /// The path of a file's module.

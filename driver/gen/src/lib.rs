@@ -2,13 +2,16 @@
 //!
 //! It reads `vk.xml`, the fragment of the driver's own extension, and
 //! `driver/support.toml`, which says what of it the driver supports, and writes the files of `driver/src/registry` and
-//! the dispatch table. From the machine-readable grammar of SPIR-V it writes the table that modules are decoded by. All
-//! are checked in, so that building the driver needs neither this crate nor these files, which `driver/gen/fetch.sh`
-//! gets. What the things are called in Rust it learns from the sources of ash and of `api/`.
+//! the dispatch table. From the fragment alone it writes the extension as `api/` has it, in Rust and in C. From the
+//! machine-readable grammar of SPIR-V it writes the table that modules are decoded by. All are checked in, so that
+//! building the driver needs neither this crate nor the files that `driver/gen/fetch.sh` gets. What Vulkan's things are
+//! called in Rust it learns from the sources of ash.
 
+mod api;
 mod ash;
 mod chains;
 mod commands;
+mod dynamic_states;
 mod entry_points;
 mod error;
 mod extensions;
@@ -42,11 +45,13 @@ pub struct File {
 /// # Errors
 /// Each [`Error`] names what has to be changed, the registry's file, `driver/support.toml`, or the driver.
 pub fn generate(root: &Path, vk_xml: &Path) -> Result<Vec<File>, Error> {
-    let registry = Registry::read(vk_xml, &root.join("api/spec/vk_gaurast.xml"))?;
+    let fragment = root.join("api/spec/vk_gaurast.xml");
+    let mut files = api::generate(root, &fragment)?;
+    let registry = Registry::read(vk_xml, &fragment)?;
     let support = Support::read(&root.join("driver/support.toml"))?;
     support.check(&registry)?;
-    let declarations = Declarations::read(root)?;
-    Ok(vec![
+    let declarations = Declarations::read(root, &files[0])?;
+    files.extend([
         File {
             path: "driver/src/registry/extensions.rs",
             text: extensions::write(&registry, &support)?,
@@ -66,13 +71,15 @@ pub fn generate(root: &Path, vk_xml: &Path) -> Result<Vec<File>, Error> {
                 &declarations,
                 &support,
                 &entry_points::find(root)?,
+                &dynamic_states::find(root)?,
             )?,
         },
         File {
             path: "driver/src/registry/spirv.rs",
             text: spirv::write(&registry, &declarations, &support)?,
         },
-    ])
+    ]);
+    Ok(files)
 }
 
 /// The root of the repository that this crate was built in.

@@ -48,6 +48,8 @@ pub struct Structure {
 pub struct Member {
     /// Its name.
     pub name: String,
+    /// The member that counts its elements, or an expression; `None` where it is no array.
+    pub len: Option<String>,
 }
 
 /// A command.
@@ -117,22 +119,15 @@ impl Registry {
     }
 
     fn add(&mut self, path: &Path) -> Result<(), Error> {
-        let invalid = |reason: String| Error::Registry {
-            path: path.to_owned(),
-            reason,
-        };
-        let (registry, errors) =
-            vk_parse::parse_file(path).map_err(|error| invalid(format!("{error:?}")))?;
-        if let Some(error) = errors.first() {
-            return Err(invalid(format!("{error:?}")));
-        }
-        for child in registry.0 {
+        for child in parse(path)? {
             match child {
                 RegistryChild::Types(types) => self.add_types(types.children),
                 RegistryChild::Commands(commands) => self.add_commands(commands.children),
                 RegistryChild::Feature(feature) if is_of_vulkan(Some(&feature.api)) => {
-                    let by = feature.number.as_deref().and_then(version).ok_or_else(|| {
-                        invalid(format!("{} is no version of Vulkan's", feature.name))
+                    let number = feature.number.as_deref().and_then(version);
+                    let by = number.ok_or_else(|| Error::Registry {
+                        path: path.to_owned(),
+                        reason: format!("{} is no version of Vulkan's", feature.name),
                     })?;
                     self.versions.extend(
                         feature
@@ -239,10 +234,23 @@ impl Registry {
     }
 }
 
-/// Reads a file.
+/// Parses a file of the registry's.
 ///
 /// # Errors
-/// [`Error::File`].
+/// [`Error::Registry`].
+pub(crate) fn parse(path: &Path) -> Result<Vec<RegistryChild>, Error> {
+    let invalid = |reason: String| Error::Registry {
+        path: path.to_owned(),
+        reason,
+    };
+    let (registry, errors) =
+        vk_parse::parse_file(path).map_err(|error| invalid(format!("{error:?}")))?;
+    match errors.first() {
+        Some(error) => Err(invalid(format!("{error:?}"))),
+        None => Ok(registry.0),
+    }
+}
+
 /// Reads a file of a pinned version.
 pub(crate) fn read_version(path: &Path, version: &str, sha256: &str) -> Result<String, Error> {
     let text = read(path)?;
@@ -257,6 +265,10 @@ pub(crate) fn read_version(path: &Path, version: &str, sha256: &str) -> Result<S
     })
 }
 
+/// Reads a file.
+///
+/// # Errors
+/// [`Error::File`].
 pub(crate) fn read(path: &Path) -> Result<String, Error> {
     std::fs::read_to_string(path).map_err(|source| Error::File {
         path: path.to_owned(),
@@ -292,6 +304,7 @@ fn member(member: TypeMember) -> Option<Member> {
     if !is_of_vulkan(definition.api.as_deref()) {
         return None;
     }
+    let len = definition.len;
     let name = definition
         .markup
         .into_iter()
@@ -299,7 +312,7 @@ fn member(member: TypeMember) -> Option<Member> {
             TypeMemberMarkup::Name(text) => Some(text),
             _ => None,
         })?;
-    (name != "sType" && name != "pNext").then_some(Member { name })
+    (name != "sType" && name != "pNext").then_some(Member { name, len })
 }
 
 fn command_definition(definition: CommandDefinition) -> (String, Command) {

@@ -72,13 +72,7 @@ pub(crate) fn cmd_draw_indirect(
     draw_count: u32,
     stride: u32,
 ) -> Result<(), Error> {
-    let draws = DrawIndirect {
-        parameters: buffer.range(offset, None, &DRAW_INDIRECT)?,
-        draw_count,
-        count: None,
-        stride,
-        indexed: false,
-    };
+    let draws = draws(buffer, offset, draw_count, stride)?;
     draw_indirect(recorder, draws)
 }
 
@@ -90,14 +84,14 @@ pub(crate) fn cmd_draw_indexed_indirect(
     draw_count: u32,
     stride: u32,
 ) -> Result<(), Error> {
-    let draws = DrawIndirect {
-        parameters: buffer.range(offset, None, &DRAW_INDIRECT)?,
-        draw_count,
-        count: None,
-        stride,
-        indexed: true,
-    };
-    draw_indirect(recorder, draws)
+    let draws = draws(buffer, offset, draw_count, stride)?;
+    draw_indirect(
+        recorder,
+        DrawIndirect {
+            indexed: true,
+            ..draws
+        },
+    )
 }
 
 #[doc(alias = "vkCmdDrawIndirectCount")]
@@ -111,11 +105,8 @@ pub(crate) fn cmd_draw_indirect_count(
     stride: u32,
 ) -> Result<(), Error> {
     let draws = DrawIndirect {
-        parameters: buffer.range(offset, None, &DRAW_INDIRECT)?,
-        draw_count: max_draw_count,
         count: Some(count_buffer.range(count_buffer_offset, Some(4), &DRAW_COUNT)?),
-        stride,
-        indexed: false,
+        ..draws(buffer, offset, max_draw_count, stride)?
     };
     draw_indirect(recorder, draws)
 }
@@ -131,11 +122,9 @@ pub(crate) fn cmd_draw_indexed_indirect_count(
     stride: u32,
 ) -> Result<(), Error> {
     let draws = DrawIndirect {
-        parameters: buffer.range(offset, None, &DRAW_INDIRECT)?,
-        draw_count: max_draw_count,
         count: Some(count_buffer.range(count_buffer_offset, Some(4), &DRAW_COUNT)?),
-        stride,
         indexed: true,
+        ..draws(buffer, offset, max_draw_count, stride)?
     };
     draw_indirect(recorder, draws)
 }
@@ -190,6 +179,22 @@ fn dispatch(recorder: &mut Recorder, base: [u32; 3], count: [u32; 3]) -> Result<
     recorder.require_outside_pass()?;
     recorder.push(Command::Dispatch { base, count });
     Ok(())
+}
+
+/// Draws without indices whose parameters lie in a buffer, as many as are said here.
+fn draws(
+    buffer: &Buffer,
+    offset: vk::DeviceSize,
+    draw_count: u32,
+    stride: u32,
+) -> Result<DrawIndirect, Error> {
+    Ok(DrawIndirect {
+        parameters: buffer.range(offset, None, &DRAW_INDIRECT)?,
+        draw_count,
+        count: None,
+        stride,
+        indexed: false,
+    })
 }
 
 /// Records draws whose parameters lie in a buffer.

@@ -1,4 +1,5 @@
-//! Commands that set dynamic state.
+//! Commands that set dynamic state, but for those whose parameter is the value of a row in
+//! `driver/src/pipeline/dynamic_state.rs`: these are generated.
 
 use super::Command;
 use super::buffer::Recorder;
@@ -11,115 +12,25 @@ use gaurast::vk::PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST;
 use simdevice::state::DepthBias;
 
 /// Records a state.
-fn set(recorder: &mut Recorder, state: DynamicState) -> Result<(), Error> {
+///
+/// # Errors
+/// None; a result, as all commands have.
+pub(crate) fn set(recorder: &mut Recorder, state: DynamicState) -> Result<(), Error> {
     recorder.push(Command::SetDynamicState(state));
     Ok(())
 }
 
 /// Records a state for each face of a mask.
-fn set_faces(
+///
+/// # Errors
+/// None; a result, as all commands have.
+pub(crate) fn set_faces(
     recorder: &mut Recorder,
     mask: vk::StencilFaceFlags,
     state: impl Fn(Face) -> DynamicState,
 ) -> Result<(), Error> {
     faces(mask).for_each(|face| recorder.push(Command::SetDynamicState(state(face))));
     Ok(())
-}
-
-#[doc(alias = "vkCmdSetDepthTestEnable")]
-pub(crate) fn cmd_set_depth_test_enable(
-    recorder: &mut Recorder,
-    depth_test_enable: bool,
-) -> Result<(), Error> {
-    set(
-        recorder,
-        DynamicState::DepthTestEnable {
-            enable: depth_test_enable,
-        },
-    )
-}
-
-#[doc(alias = "vkCmdSetDepthWriteEnable")]
-pub(crate) fn cmd_set_depth_write_enable(
-    recorder: &mut Recorder,
-    depth_write_enable: bool,
-) -> Result<(), Error> {
-    set(
-        recorder,
-        DynamicState::DepthWriteEnable {
-            enable: depth_write_enable,
-        },
-    )
-}
-
-#[doc(alias = "vkCmdSetDepthBoundsTestEnable")]
-pub(crate) fn cmd_set_depth_bounds_test_enable(
-    recorder: &mut Recorder,
-    depth_bounds_test_enable: bool,
-) -> Result<(), Error> {
-    set(
-        recorder,
-        DynamicState::DepthBoundsTestEnable {
-            enable: depth_bounds_test_enable,
-        },
-    )
-}
-
-#[doc(alias = "vkCmdSetStencilTestEnable")]
-pub(crate) fn cmd_set_stencil_test_enable(
-    recorder: &mut Recorder,
-    stencil_test_enable: bool,
-) -> Result<(), Error> {
-    set(
-        recorder,
-        DynamicState::StencilTestEnable {
-            enable: stencil_test_enable,
-        },
-    )
-}
-
-#[doc(alias = "vkCmdSetRasterizerDiscardEnable")]
-pub(crate) fn cmd_set_rasterizer_discard_enable(
-    recorder: &mut Recorder,
-    rasterizer_discard_enable: bool,
-) -> Result<(), Error> {
-    set(
-        recorder,
-        DynamicState::RasterizerDiscardEnable {
-            enable: rasterizer_discard_enable,
-        },
-    )
-}
-
-#[doc(alias = "vkCmdSetDepthBiasEnable")]
-pub(crate) fn cmd_set_depth_bias_enable(
-    recorder: &mut Recorder,
-    depth_bias_enable: bool,
-) -> Result<(), Error> {
-    set(
-        recorder,
-        DynamicState::DepthBiasEnable {
-            enable: depth_bias_enable,
-        },
-    )
-}
-
-#[doc(alias = "vkCmdSetPrimitiveRestartEnable")]
-pub(crate) fn cmd_set_primitive_restart_enable(
-    recorder: &mut Recorder,
-    primitive_restart_enable: bool,
-) -> Result<(), Error> {
-    set(
-        recorder,
-        DynamicState::PrimitiveRestartEnable {
-            enable: primitive_restart_enable,
-        },
-    )
-}
-
-#[doc(alias = "vkCmdSetLineWidth")]
-pub(crate) fn cmd_set_line_width(recorder: &mut Recorder, line_width: f32) -> Result<(), Error> {
-    set(recorder, DynamicState::LineWidth { width: line_width })
 }
 
 #[doc(alias = "vkCmdSetDepthBias")]
@@ -137,19 +48,6 @@ pub(crate) fn cmd_set_depth_bias(
     set(recorder, DynamicState::DepthBias { bias })
 }
 
-#[doc(alias = "vkCmdSetBlendConstants")]
-pub(crate) fn cmd_set_blend_constants(
-    recorder: &mut Recorder,
-    blend_constants: &[f32; 4],
-) -> Result<(), Error> {
-    set(
-        recorder,
-        DynamicState::BlendConstants {
-            constants: *blend_constants,
-        },
-    )
-}
-
 #[doc(alias = "vkCmdSetDepthBounds")]
 pub(crate) fn cmd_set_depth_bounds(
     recorder: &mut Recorder,
@@ -162,44 +60,6 @@ pub(crate) fn cmd_set_depth_bounds(
             bounds: (min_depth_bounds, max_depth_bounds),
         },
     )
-}
-
-#[doc(alias = "vkCmdSetStencilCompareMask")]
-pub(crate) fn cmd_set_stencil_compare_mask(
-    recorder: &mut Recorder,
-    face_mask: vk::StencilFaceFlags,
-    compare_mask: u32,
-) -> Result<(), Error> {
-    set_faces(recorder, face_mask, |face| {
-        DynamicState::StencilCompareMask {
-            face,
-            mask: compare_mask as u8,
-        }
-    })
-}
-
-#[doc(alias = "vkCmdSetStencilWriteMask")]
-pub(crate) fn cmd_set_stencil_write_mask(
-    recorder: &mut Recorder,
-    face_mask: vk::StencilFaceFlags,
-    write_mask: u32,
-) -> Result<(), Error> {
-    set_faces(recorder, face_mask, |face| DynamicState::StencilWriteMask {
-        face,
-        mask: write_mask as u8,
-    })
-}
-
-#[doc(alias = "vkCmdSetStencilReference")]
-pub(crate) fn cmd_set_stencil_reference(
-    recorder: &mut Recorder,
-    face_mask: vk::StencilFaceFlags,
-    reference: u32,
-) -> Result<(), Error> {
-    set_faces(recorder, face_mask, |face| DynamicState::StencilReference {
-        face,
-        reference: reference as u8,
-    })
 }
 
 /// The ids of the rules on the operations of `vkCmdSetStencilOp`.
@@ -224,22 +84,6 @@ pub(crate) fn cmd_set_stencil_op(
         face,
         ops,
     })
-}
-
-#[doc(alias = "vkCmdSetCullMode")]
-pub(crate) fn cmd_set_cull_mode(
-    recorder: &mut Recorder,
-    cull_mode: vk::CullModeFlags,
-) -> Result<(), Error> {
-    set(recorder, DynamicState::CullMode { mode: cull_mode })
-}
-
-#[doc(alias = "vkCmdSetFrontFace")]
-pub(crate) fn cmd_set_front_face(
-    recorder: &mut Recorder,
-    front_face: vk::FrontFace,
-) -> Result<(), Error> {
-    set(recorder, DynamicState::FrontFace { face: front_face })
 }
 
 #[doc(alias = "vkCmdSetPrimitiveTopology")]

@@ -195,15 +195,6 @@ impl DescriptorSetLayout {
         self.bindings.values()
     }
 
-    /// The bindings that have descriptors, with their numbers.
-    pub(crate) fn numbered(&self) -> impl Iterator<Item = (u32, &LayoutBinding)> {
-        let bindings = self
-            .bindings
-            .iter()
-            .map(|(&number, binding)| (number, binding));
-        bindings.filter(|(_, binding)| binding.count > 0)
-    }
-
     /// The number of descriptors that a set has.
     pub(crate) fn count(&self) -> usize {
         self.count

@@ -17,6 +17,7 @@ use crate::abi::guard::guard;
 use crate::abi::handle;
 use crate::abi::valid::{self, OutputChain, Structures};
 use crate::command::buffer::record;
+use crate::pipeline::dynamic_state::DynamicState;
 use ash::vk;
 
 static ROWS: &[Command] = rows! {
@@ -2484,7 +2485,8 @@ unsafe extern "system" fn vkCmdSetLineWidth(command_buffer: vk::CommandBuffer, l
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdSetLineWidth", |recorder| {
-                crate::command::dynamic_state::cmd_set_line_width(recorder, line_width)
+                let width = line_width;
+                crate::command::dynamic_state::set(recorder, DynamicState::LineWidth { width })
             })
         }
     })
@@ -2519,9 +2521,10 @@ unsafe extern "system" fn vkCmdSetBlendConstants(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdSetBlendConstants", |recorder| {
-                crate::command::dynamic_state::cmd_set_blend_constants(
+                let constants = *valid::input(blend_constants)?;
+                crate::command::dynamic_state::set(
                     recorder,
-                    valid::input(blend_constants)?,
+                    DynamicState::BlendConstants { constants },
                 )
             })
         }
@@ -2556,11 +2559,10 @@ unsafe extern "system" fn vkCmdSetStencilCompareMask(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdSetStencilCompareMask", |recorder| {
-                crate::command::dynamic_state::cmd_set_stencil_compare_mask(
-                    recorder,
-                    face_mask,
-                    compare_mask,
-                )
+                let mask = compare_mask as u8;
+                crate::command::dynamic_state::set_faces(recorder, face_mask, |face| {
+                    DynamicState::StencilCompareMask { face, mask }
+                })
             })
         }
     })
@@ -2575,9 +2577,10 @@ unsafe extern "system" fn vkCmdSetStencilWriteMask(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdSetStencilWriteMask", |recorder| {
-                crate::command::dynamic_state::cmd_set_stencil_write_mask(
-                    recorder, face_mask, write_mask,
-                )
+                let mask = write_mask as u8;
+                crate::command::dynamic_state::set_faces(recorder, face_mask, |face| {
+                    DynamicState::StencilWriteMask { face, mask }
+                })
             })
         }
     })
@@ -2592,9 +2595,10 @@ unsafe extern "system" fn vkCmdSetStencilReference(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdSetStencilReference", |recorder| {
-                crate::command::dynamic_state::cmd_set_stencil_reference(
-                    recorder, face_mask, reference,
-                )
+                let reference = reference as u8;
+                crate::command::dynamic_state::set_faces(recorder, face_mask, |face| {
+                    DynamicState::StencilReference { face, reference }
+                })
             })
         }
     })
@@ -3962,7 +3966,8 @@ unsafe extern "system" fn vkCmdSetCullMode(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdSetCullMode", |recorder| {
-                crate::command::dynamic_state::cmd_set_cull_mode(recorder, cull_mode)
+                let mode = cull_mode;
+                crate::command::dynamic_state::set(recorder, DynamicState::CullMode { mode })
             })
         }
     })
@@ -3976,7 +3981,8 @@ unsafe extern "system" fn vkCmdSetFrontFace(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdSetFrontFace", |recorder| {
-                crate::command::dynamic_state::cmd_set_front_face(recorder, front_face)
+                let face = front_face;
+                crate::command::dynamic_state::set(recorder, DynamicState::FrontFace { face })
             })
         }
     })
@@ -4073,9 +4079,10 @@ unsafe extern "system" fn vkCmdSetDepthTestEnable(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdSetDepthTestEnable", |recorder| {
-                crate::command::dynamic_state::cmd_set_depth_test_enable(
+                let enable = depth_test_enable != vk::FALSE;
+                crate::command::dynamic_state::set(
                     recorder,
-                    depth_test_enable != vk::FALSE,
+                    DynamicState::DepthTestEnable { enable },
                 )
             })
         }
@@ -4090,9 +4097,10 @@ unsafe extern "system" fn vkCmdSetDepthWriteEnable(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdSetDepthWriteEnable", |recorder| {
-                crate::command::dynamic_state::cmd_set_depth_write_enable(
+                let enable = depth_write_enable != vk::FALSE;
+                crate::command::dynamic_state::set(
                     recorder,
-                    depth_write_enable != vk::FALSE,
+                    DynamicState::DepthWriteEnable { enable },
                 )
             })
         }
@@ -4124,9 +4132,10 @@ unsafe extern "system" fn vkCmdSetDepthBoundsTestEnable(
                 command_buffer,
                 "vkCmdSetDepthBoundsTestEnable",
                 |recorder| {
-                    crate::command::dynamic_state::cmd_set_depth_bounds_test_enable(
+                    let enable = depth_bounds_test_enable != vk::FALSE;
+                    crate::command::dynamic_state::set(
                         recorder,
-                        depth_bounds_test_enable != vk::FALSE,
+                        DynamicState::DepthBoundsTestEnable { enable },
                     )
                 },
             )
@@ -4142,9 +4151,10 @@ unsafe extern "system" fn vkCmdSetStencilTestEnable(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdSetStencilTestEnable", |recorder| {
-                crate::command::dynamic_state::cmd_set_stencil_test_enable(
+                let enable = stencil_test_enable != vk::FALSE;
+                crate::command::dynamic_state::set(
                     recorder,
-                    stencil_test_enable != vk::FALSE,
+                    DynamicState::StencilTestEnable { enable },
                 )
             })
         }
@@ -4187,9 +4197,10 @@ unsafe extern "system" fn vkCmdSetRasterizerDiscardEnable(
                 command_buffer,
                 "vkCmdSetRasterizerDiscardEnable",
                 |recorder| {
-                    crate::command::dynamic_state::cmd_set_rasterizer_discard_enable(
+                    let enable = rasterizer_discard_enable != vk::FALSE;
+                    crate::command::dynamic_state::set(
                         recorder,
-                        rasterizer_discard_enable != vk::FALSE,
+                        DynamicState::RasterizerDiscardEnable { enable },
                     )
                 },
             )
@@ -4205,9 +4216,10 @@ unsafe extern "system" fn vkCmdSetDepthBiasEnable(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdSetDepthBiasEnable", |recorder| {
-                crate::command::dynamic_state::cmd_set_depth_bias_enable(
+                let enable = depth_bias_enable != vk::FALSE;
+                crate::command::dynamic_state::set(
                     recorder,
-                    depth_bias_enable != vk::FALSE,
+                    DynamicState::DepthBiasEnable { enable },
                 )
             })
         }
@@ -4225,9 +4237,10 @@ unsafe extern "system" fn vkCmdSetPrimitiveRestartEnable(
                 command_buffer,
                 "vkCmdSetPrimitiveRestartEnable",
                 |recorder| {
-                    crate::command::dynamic_state::cmd_set_primitive_restart_enable(
+                    let enable = primitive_restart_enable != vk::FALSE;
+                    crate::command::dynamic_state::set(
                         recorder,
-                        primitive_restart_enable != vk::FALSE,
+                        DynamicState::PrimitiveRestartEnable { enable },
                     )
                 },
             )

@@ -5,9 +5,9 @@ use crate::abi::handle::{self, objects};
 use crate::abi::valid;
 use crate::descriptor::layout::DescriptorSetLayout;
 use crate::physical_device::limits;
-use crate::pipeline::reflect;
 use ash::vk;
-use gaurast_spirv::{DescriptorKind, Interface, Stage};
+use gaurast_spirv::{DescriptorKind, Interface, ShaderBinding, Stage};
+use std::ops::Range;
 use std::sync::Arc;
 
 /// A pipeline's layout: what its programs may be bound to.
@@ -81,41 +81,89 @@ impl PipelineLayout {
     /// # Errors
     /// [`Error::InvalidUsage`] names all that is missing.
     pub(crate) fn check(&self, interface: &Interface) -> Result<(), Error> {
-        let stage = stage_flag(interface.stage);
-        let bindings = (0..).zip(&self.set_layouts).flat_map(|(set, layout)| {
-            let bindings = layout.iter().flat_map(|layout| layout.numbered());
-            bindings.filter_map(move |(number, binding)| {
-                Some(reflect::LayoutBinding {
-                    set,
-                    binding: number,
-                    kind: kind(binding.kind)?,
-                    count: binding.count,
-                    visible: binding.stages.contains(stage),
-                })
-            })
-        });
-        let push_constants = self
-            .push_constants
-            .iter()
-            .map(|range| reflect::PushConstantRange {
-                offset: range.offset,
-                size: range.size,
-                visible: range.stage_flags.contains(stage),
-            });
-        let layout = reflect::Layout {
-            bindings: bindings.collect(),
-            push_constants: push_constants.collect(),
-        };
-        let mismatches = reflect::check(interface, &layout);
+        let mismatches = self.mismatches(interface);
         if mismatches.is_empty() {
             return Ok(());
         }
-        let messages: Vec<_> = mismatches.iter().map(ToString::to_string).collect();
         let vuid = match interface.stage {
             Stage::Compute => "VUID-VkComputePipelineCreateInfo-layout-07988",
             Stage::Vertex | Stage::Fragment => "VUID-VkGraphicsPipelineCreateInfo-layout-07988",
         };
-        Err(Error::usage(vuid, messages.join("; ")))
+        Err(Error::usage(vuid, mismatches.join("; ")))
+    }
+
+    /// The disagreements of a shader with the layout.
+    pub(super) fn mismatches(&self, interface: &Interface) -> Vec<String> {
+        let stage = interface.stage;
+        let descriptors = interface.descriptors.iter();
+        let mut found: Vec<String> = descriptors
+            .filter_map(|wanted| self.descriptor_mismatch(stage, wanted))
+            .collect();
+        if let Some(bytes) = &interface.push_constants
+            && !self.has_push_constants(stage, bytes)
+        {
+            found.push(format!(
+                "the {stage} shader uses push constants {} to {}, which no range of the pipeline layout covers",
+                bytes.start, bytes.end
+            ));
+        }
+        found
+    }
+
+    /// The disagreement of a shader's binding with the layout, if there is one.
+    fn descriptor_mismatch(&self, stage: Stage, wanted: &ShaderBinding) -> Option<String> {
+        let set = self.set_layouts.get(wanted.set as usize);
+        let set = set.and_then(Option::as_ref);
+        let given = set.and_then(|set| set.binding(wanted.binding));
+        let given = given.and_then(|given| Some((given, kind(given.kind)?)));
+        let name = wanted.name.as_ref();
+        let name = name.map_or_else(String::new, |name| format!(" (\"{name}\")"));
+        let place = format!("set {}, binding {}{name}", wanted.set, wanted.binding);
+        let Some((given, given_kind)) = given else {
+            return Some(format!(
+                "the {stage} shader uses {place}, which the pipeline layout doesn't have"
+            ));
+        };
+        if !given.stages.contains(stage_flag(stage)) {
+            return Some(format!(
+                "{place} of the pipeline layout isn't visible to the {stage} stage"
+            ));
+        }
+        // A combined descriptor may serve as either of its parts.
+        let is_part = given_kind == DescriptorKind::CombinedImageSampler
+            && matches!(
+                wanted.kind,
+                DescriptorKind::SampledImage | DescriptorKind::Sampler
+            );
+        if wanted.kind != given_kind && !is_part {
+            return Some(format!(
+                "{place} is a {:?} in the {stage} shader, but a {given_kind:?} in the pipeline layout",
+                wanted.kind
+            ));
+        }
+        (wanted.count > given.count).then(|| {
+            format!(
+                "{place} has {} descriptors in the pipeline layout; the {stage} shader wants {}",
+                given.count, wanted.count
+            )
+        })
+    }
+
+    /// Tells if ranges that a stage sees cover all bytes.
+    fn has_push_constants(&self, stage: Stage, bytes: &Range<u32>) -> bool {
+        let ranges = self.push_constants.iter();
+        let mut visible: Vec<(u32, u32)> = ranges
+            .filter(|range| range.stage_flags.contains(stage_flag(stage)))
+            .map(|range| (range.offset, range.offset.saturating_add(range.size)))
+            .collect();
+        visible.sort_unstable();
+        let mut covered = bytes.start;
+        for (first, last) in visible {
+            if first <= covered {
+                covered = covered.max(last);
+            }
+        }
+        covered >= bytes.end
     }
 }
 

@@ -242,28 +242,42 @@ fn carry_distances(vertex: &mut Shader, fragment: &mut Shader) {
 
 /// Numbers what the vertex stage writes and the fragment stage reads, in order of their components.
 fn varyings(vertex: &Interface, fragment: &Interface) -> Varyings {
-    let written = |place: InterfaceComponent| {
-        vertex.outputs.iter().any(|output| {
-            matches!(output.target, OutputTarget::Location { location, component, .. }
-                if (location, component) == place)
-        })
-    };
-    let mut components: Vec<InterfaceComponent> = fragment
-        .inputs
-        .iter()
-        .filter_map(|input| match input.source {
-            InputSource::Location {
-                location,
-                component,
-                ..
-            } => Some((location, component)),
-            InputSource::BuiltIn { .. } => None,
-        })
-        .filter(|place| written(*place))
+    let mut components: Vec<InterfaceComponent> = components_read(fragment)
+        .filter(|place| writes(vertex, *place))
         .collect();
     components.sort_unstable();
     components.dedup();
     components.into_iter().zip(0..).collect()
+}
+
+/// The components that the fragment stage reads and the vertex stage doesn't write, in the order of its inputs.
+pub(super) fn unwritten(vertex: &Interface, fragment: &Interface) -> Vec<InterfaceComponent> {
+    let mut components: Vec<InterfaceComponent> = components_read(fragment)
+        .filter(|place| !writes(vertex, *place))
+        .collect();
+    components.dedup();
+    components
+}
+
+/// The components of locations that a stage reads.
+fn components_read(interface: &Interface) -> impl Iterator<Item = InterfaceComponent> {
+    let inputs = interface.inputs.iter();
+    inputs.filter_map(|input| match input.source {
+        InputSource::Location {
+            location,
+            component,
+            ..
+        } => Some((location, component)),
+        InputSource::BuiltIn { .. } => None,
+    })
+}
+
+/// Tells if a stage writes a component of a location.
+fn writes(interface: &Interface, place: InterfaceComponent) -> bool {
+    interface.outputs.iter().any(|output| {
+        matches!(output.target, OutputTarget::Location { location, component, .. }
+            if (location, component) == place)
+    })
 }
 
 /// Makes constants of zero of the inputs that nothing is put into. (Slots are indices into `inputs`.)

@@ -8,10 +8,11 @@ pub(crate) mod gaussian;
 pub(crate) mod layout;
 mod link;
 pub(crate) mod primitives;
-mod reflect;
 pub(crate) mod resources;
 mod stages;
 pub(crate) mod state;
+#[cfg(test)]
+mod tests;
 
 use self::compute::ComputePipeline;
 use self::gaussian::GaussianPipeline;

@@ -74,7 +74,6 @@ impl PrimitivePipeline {
             .transpose()?;
         let locations = vertex.interface.locations_read();
         let attributes = stages::attributes(info, &locations)?;
-        stages::check_attributes(&vertex.interface, &locations, &attributes)?;
         if let Some(fragment) = &fragment {
             stages::warn_of_unwritten(device, &vertex.interface, &fragment.interface);
         }

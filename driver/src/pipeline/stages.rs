@@ -1,15 +1,16 @@
 //! Shader stages, translated and compared with the pipeline's layout and vertex input.
 
 use super::layout::PipelineLayout;
+use super::link;
 use super::state::{AttributeSource, GraphicsState, source};
 use crate::abi::error::Error;
 use crate::device::Device;
 use crate::physical_device::limits;
-use crate::pipeline::reflect;
 use crate::shader_module::ShaderStage;
 use ash::vk;
 use gaurast_spirv::{Interface, Options, ScalarType, Shader, Stage};
-use simdevice::format;
+use simdevice::Format;
+use simdevice::format::Numeric;
 
 /// Translates a stage and compares it with the layout.
 pub(crate) fn translate(
@@ -41,6 +42,9 @@ pub(crate) fn translate(
 }
 
 /// The sources that locations are read from.
+///
+/// # Errors
+/// [`Error::InvalidUsage`] for a location that no attribute feeds, or one with numbers of another kind.
 pub(crate) fn attributes(
     info: &GraphicsState,
     locations: &[(u32, ScalarType)],
@@ -53,41 +57,51 @@ pub(crate) fn attributes(
             )
         })
     };
-    locations.iter().map(source).collect()
-}
-
-/// Compares the types of attributes with what the shader reads.
-pub(crate) fn check_attributes(
-    interface: &Interface,
-    locations: &[(u32, ScalarType)],
-    attributes: &[AttributeSource],
-) -> Result<(), Error> {
-    let given = |format: simdevice::Format| match format.numeric() {
-        format::Numeric::Uint => ScalarType::Uint { width: 32 },
-        format::Numeric::Sint => ScalarType::Int { width: 32 },
-        _ => ScalarType::Float { width: 32 },
-    };
-    let described: Vec<_> = std::iter::zip(locations, attributes)
-        .map(|(&(location, _), source)| reflect::Attribute {
-            location,
-            numeric: given(source.format),
-        })
+    let sources: Vec<_> = locations.iter().map(source).collect::<Result<_, _>>()?;
+    let mismatches: Vec<String> = std::iter::zip(locations, &sources)
+        .filter_map(|(&(location, wanted), source)| type_mismatch(location, wanted, source.format))
         .collect();
-    let mismatches = reflect::check_attributes(interface, &described);
     if mismatches.is_empty() {
-        return Ok(());
+        return Ok(sources);
     }
-    let messages: Vec<_> = mismatches.iter().map(ToString::to_string).collect();
     Err(Error::usage(
         "VUID-VkGraphicsPipelineCreateInfo-Input-08733",
-        messages.join("; "),
+        mismatches.join("; "),
     ))
+}
+
+/// The disagreement of what a shader reads at a location with the numbers of the attribute's format, if there is one.
+pub(super) fn type_mismatch(location: u32, wanted: ScalarType, format: Format) -> Option<String> {
+    // Normalised and scaled formats are floats.
+    let given = match format.numeric() {
+        Numeric::Uint => ScalarType::Uint { width: 32 },
+        Numeric::Sint => ScalarType::Int { width: 32 },
+        _ => ScalarType::Float { width: 32 },
+    };
+    (class(given) != class(wanted)).then(|| {
+        format!(
+            "the vertex shader reads location {location} as {wanted:?}, but the attribute's format is {given:?}"
+        )
+    })
+}
+
+/// The class of a type, which a format and an input must have in common: the kind of number, and if it has 64 bits.
+fn class(ty: ScalarType) -> (u8, bool) {
+    match ty {
+        ScalarType::Float { width } => (0, width == 64),
+        ScalarType::Int { width } => (1, width == 64),
+        ScalarType::Uint { width } => (2, width == 64),
+        ScalarType::Bool => (2, false),
+    }
 }
 
 /// Tells of inputs that the stage before doesn't write. They read as zero.
 pub(crate) fn warn_of_unwritten(device: &Device, vertex: &Interface, fragment: &Interface) {
-    for mismatch in reflect::check_stages(vertex, fragment) {
-        let message = format!("{mismatch}; it reads as 0");
+    for (location, component) in link::unwritten(vertex, fragment) {
+        let message = format!(
+            "the fragment shader reads location {location}, component {component}, which the vertex shader doesn't \
+             write; it reads as 0"
+        );
         log::warn!("{message}");
         device.instance().report(
             vk::DebugUtilsMessageSeverityFlagsEXT::WARNING,

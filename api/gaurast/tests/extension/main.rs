@@ -4,6 +4,7 @@ mod ash_chain;
 mod camera;
 mod header;
 mod layout;
+mod names;
 
 fn main() -> std::process::ExitCode {
     gaurast_runner::main()

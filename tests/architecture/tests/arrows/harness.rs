@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 
 use toml::{Table, Value};
 
+use crate::workspace;
+
 /// The files below a folder that end in `.rs`, but for other packages' and `left_out`.
 fn sources(folder: &Path, left_out: &[PathBuf], found: &mut Vec<PathBuf>) {
     for entry in std::fs::read_dir(folder).expect("a folder") {
@@ -48,16 +50,10 @@ fn without_harness(folder: &Path, manifest: &Table) -> Vec<PathBuf> {
 
 #[gaurast_runner::test]
 fn no_test_is_dropped() {
-    let root = super::root();
-    let read = |path: &Path| -> Table {
-        let text = std::fs::read_to_string(path).expect("a manifest");
-        toml::from_str(&text).expect("TOML")
-    };
-    let members = read(&root.join("Cargo.toml"))["workspace"]["members"].clone();
+    let root = workspace::root();
     let mut files = 0;
-    for member in members.as_array().expect("members") {
-        let folder = root.join(member.as_str().expect("a path"));
-        for file in without_harness(&folder, &read(&folder.join("Cargo.toml"))) {
+    for package in workspace::packages() {
+        for file in without_harness(&root.join(&package.folder), &package.manifest) {
             files += 1;
             let text = std::fs::read_to_string(&file).expect("a source file");
             let bare = text.lines().position(|line| line.trim() == "#[test]");

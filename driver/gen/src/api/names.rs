@@ -1,0 +1,63 @@
+//! Writes what the C header must say of the Rust, as expressions of C with their values.
+
+use super::{Extension, Structure, rust_constant, rust_file, rust_name};
+use crate::error::Error;
+use std::fmt::Write;
+
+pub(super) fn write(extension: &Extension) -> Result<String, Error> {
+    let mut layout = String::new();
+    for structure in &extension.structures {
+        add_structure(&mut layout, structure);
+    }
+    let mut values = String::new();
+    let mut add = |name: &str, value: &str| {
+        let _ = writeln!(values, "(\"{name}\", {value} as i64),");
+    };
+    for constant in &extension.constants {
+        add(&constant.name, rust_constant(&constant.name));
+    }
+    for added in &extension.added {
+        let value = format!("{}.as_raw()", rust_constant(&added.name));
+        add(&added.name, &value);
+    }
+    for of in &extension.enums {
+        let ty = of.type_name();
+        for value in &of.values {
+            let path = format!("{}::{}.as_raw()", rust_name(&ty), of.short_name(value));
+            add(&value.name, &path);
+        }
+    }
+    rust_file(
+        "//! The extension's names in C, with what they are in Rust.",
+        &format!(
+            "use core::mem::offset_of;
+            use gaurast::vk::*;
+
+            /// Sizes of structures and offsets of members.
+            pub const LAYOUT: &[(&str, usize)] = &[{layout}];
+
+            /// Values of enums, flags and constants.
+            pub const VALUES: &[(&str, i64)] = &[{values}];
+            "
+        ),
+    )
+}
+
+fn add_structure(layout: &mut String, structure: &Structure) {
+    let c = &structure.name;
+    let lifetime = if structure.structure_type.is_some() {
+        "<'_>"
+    } else {
+        ""
+    };
+    let rust = format!("{}{lifetime}", rust_name(c));
+    let _ = writeln!(layout, "(\"sizeof({c})\", size_of::<{rust}>()),");
+    for member in &structure.members {
+        let _ = writeln!(
+            layout,
+            "(\"offsetof({c}, {})\", offset_of!({rust}, {})),",
+            member.name,
+            member.rust_name()
+        );
+    }
+}

@@ -1,0 +1,429 @@
+//! Writes the extension in Rust, in the shape in which ash has the extensions that it knows.
+
+use super::comment::Comments;
+use super::{
+    Command, Enum, Extension, Member, Structure, TAG, rust_constant, rust_file, rust_name,
+};
+use crate::error::Error;
+use crate::rust::snake_case;
+use std::collections::BTreeSet;
+use std::fmt::Write;
+
+/// A number with underscores between its thousands.
+fn grouped(number: i64) -> String {
+    let digits = number.to_string();
+    let mut text = String::new();
+    for (index, digit) in digits.chars().enumerate() {
+        if index > 0 && (digits.len() - index).is_multiple_of(3) {
+            text.push('_');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+/// A scalar or a name of C's as a type of Rust's.
+fn base_type(name: &str) -> String {
+    match name {
+        "void" => "c_void".to_owned(),
+        "float" => "f32".to_owned(),
+        "double" => "f64".to_owned(),
+        "uint32_t" => "u32".to_owned(),
+        "uint64_t" => "u64".to_owned(),
+        _ if name.ends_with(TAG) => rust_name(name).to_owned(),
+        _ => format!("vk::{}", rust_name(name)),
+    }
+}
+
+impl Member {
+    /// Its type in Rust.
+    fn rust_type(&self) -> String {
+        let base = base_type(&self.ty);
+        if self.is_pointer {
+            let kind = if self.is_const { "const" } else { "mut" };
+            let lifetime = if self.ty.ends_with(TAG) { "<'_>" } else { "" };
+            return format!("*{kind} {base}{lifetime}");
+        }
+        let lengths = self.lengths.iter().rev();
+        lengths.fold(base, |ty, length| format!("[{ty}; {length}]"))
+    }
+}
+
+/// The module of structures, enums, constants and function types.
+pub(super) fn definitions(
+    extension: &Extension,
+    defaults: &BTreeSet<String>,
+) -> Result<String, Error> {
+    let comments = Comments {
+        extension,
+        path: "",
+    };
+    let mut code = String::new();
+    for constant in &extension.constants {
+        let _ = writeln!(
+            code,
+            "{}pub const {}: u32 = {};\n",
+            comments.item(&constant.name, &constant.comment, None),
+            rust_constant(&constant.name),
+            constant
+                .value
+                .replace(['(', ')', 'U'], "")
+                .replace('~', "!")
+        );
+    }
+    for added in &extension.added {
+        let ty = rust_name(&added.of);
+        let _ = writeln!(
+            code,
+            "{}pub const {}: vk::{ty} = vk::{ty}::from_raw({});\n",
+            comments.item(&added.name, &added.comment, None),
+            rust_constant(&added.name),
+            grouped(added.value)
+        );
+    }
+    for of in &extension.enums {
+        add_enum(&mut code, comments, of);
+    }
+    for structure in &extension.structures {
+        add_structure(&mut code, comments, structure, defaults);
+    }
+    for command in &extension.commands {
+        let parameters: String = command.parameters.iter().map(declaration).collect();
+        let _ = writeln!(
+            code,
+            "/// The type of `{0}`.
+            #[allow(non_camel_case_types)]
+            pub type PFN_{0} = unsafe extern \"system\" fn({parameters});\n",
+            command.name
+        );
+    }
+    rust_file(
+        "//! The extension's structures, enums, flags, constants and function types.",
+        &format!(
+            "use core::ffi::c_void;
+            use core::marker::PhantomData;
+
+            use ash::vk;
+
+            use crate::ash_compat::{{bool_setters, setters, tagged_structure, vk_enum, vk_flags}};
+
+            {code}"
+        ),
+    )
+}
+
+fn declaration(member: &Member) -> String {
+    format!("{}: {},", member.rust_name(), member.rust_type())
+}
+
+fn add_enum(code: &mut String, comments: Comments<'_>, of: &Enum) {
+    let kind = if of.is_flags { "vk_flags" } else { "vk_enum" };
+    let name = of.type_name();
+    let mut values = String::new();
+    for value in &of.values {
+        let _ = writeln!(
+            values,
+            "{}        {} = {},",
+            indented(&comments.item(&value.name, &value.comment, None), 8),
+            of.short_name(value),
+            value.value
+        );
+    }
+    // rustfmt leaves the arguments of macros as they are.
+    let _ = writeln!(
+        code,
+        "{kind}! {{\n{}    pub struct {} {{\n{values}    }}\n}}\n",
+        indented(&comments.item(&name, &of.comment, None), 4),
+        rust_name(&name)
+    );
+}
+
+fn indented(text: &str, by: usize) -> String {
+    let mut indented = String::new();
+    for line in text.lines() {
+        let _ = writeln!(indented, "{:by$}{line}", "");
+    }
+    indented
+}
+
+fn add_structure(
+    code: &mut String,
+    comments: Comments<'_>,
+    structure: &Structure,
+    defaults: &BTreeSet<String>,
+) {
+    let name = rust_name(&structure.name);
+    let is_tagged = structure.structure_type.is_some();
+    let (declared, any) = if is_tagged {
+        ("<'a>", "<'_>")
+    } else {
+        ("", "")
+    };
+    let has_floats = structure
+        .members
+        .iter()
+        .any(|member| matches!(&*member.ty, "float" | "double"));
+    let traits = match (is_tagged, has_floats) {
+        (true, _) => "Copy, Clone, Debug",
+        (false, true) => "Copy, Clone, Debug, PartialEq",
+        (false, false) => "Copy, Clone, Debug, PartialEq, Eq, Hash",
+    };
+    let mut fields = String::new();
+    for member in &structure.members {
+        let comment = match &*member.name {
+            "sType" => "The structure's type.",
+            "pNext" => "The next structure of the chain, or null.",
+            _ => &member.comment,
+        };
+        let _ = writeln!(
+            fields,
+            "{}pub {}",
+            comments.text(comment, Some(structure)),
+            declaration(member)
+        );
+    }
+    if is_tagged {
+        fields.push_str(
+            "/// The lifetime of the `p_next` chain.\npub _marker: PhantomData<&'a ()>,\n",
+        );
+    }
+    let _ = writeln!(
+        code,
+        "{}#[repr(C)]
+        #[derive({traits})]
+        #[must_use]
+        pub struct {name}{declared} {{ {fields} }}\n",
+        comments.item(&structure.name, &structure.comment, Some(structure))
+    );
+    if let Some(structure_type) = &structure.structure_type {
+        let extends = structure.extends.iter();
+        let extends: String = extends
+            .map(|name| format!(", Extends{}", rust_name(name)))
+            .collect();
+        let _ = writeln!(
+            code,
+            "tagged_structure!({name} = {}{extends});\n",
+            rust_constant(structure_type)
+        );
+    }
+    if !defaults.contains(name) {
+        let values: String = structure.members.iter().map(default_value).collect();
+        let marker = if is_tagged {
+            "_marker: PhantomData,"
+        } else {
+            ""
+        };
+        let _ = writeln!(
+            code,
+            "impl Default for {name}{any} {{
+                #[inline]
+                fn default() -> Self {{ Self {{ {values} {marker} }} }}
+            }}\n"
+        );
+    }
+    let _ = writeln!(code, "impl {name}{any} {{\n{}}}\n", setters(structure));
+}
+
+/// A member with its default.
+fn default_value(member: &Member) -> String {
+    let value = match (&*member.name, member.is_pointer, member.is_const) {
+        ("sType", ..) => "<Self as vk::TaggedStructure>::STRUCTURE_TYPE".to_owned(),
+        (_, true, true) => "core::ptr::null()".to_owned(),
+        (_, true, false) => "core::ptr::null_mut()".to_owned(),
+        _ if member.lengths.is_empty() => format!("{}::default()", member.rust_type()),
+        _ => format!("<{}>::default()", member.rust_type()),
+    };
+    format!("{}: {value},\n", member.rust_name())
+}
+
+/// The calls of the macros that write setters.
+fn setters(structure: &Structure) -> String {
+    let (mut bools, mut others) = (String::new(), String::new());
+    for member in &structure.members {
+        if matches!(&*member.name, "sType" | "pNext") {
+            continue;
+        }
+        if member.ty == "VkBool32" {
+            let _ = writeln!(bools, "        {},", member.rust_name());
+        } else {
+            let ty = member.rust_type();
+            let _ = writeln!(others, "        {}: {ty},", member.rust_name());
+        }
+    }
+    let call = |name: &str, arguments: String| {
+        if arguments.is_empty() {
+            return String::new();
+        }
+        format!("    {name}! {{\n{arguments}    }}\n")
+    };
+    call("bool_setters", bools) + &call("setters", others)
+}
+
+/// The module of the extension's name and functions.
+pub(super) fn functions(extension: &Extension) -> Result<String, Error> {
+    let comments = Comments {
+        extension,
+        path: "crate::vk::",
+    };
+    let (mut calls, mut pointers, mut loads) = (String::new(), String::new(), String::new());
+    for command in &extension.commands {
+        add_command(&mut calls, comments, command);
+        let (name, field) = (&command.name, field_name(command));
+        let _ = writeln!(pointers, "/// `{name}`.\npub {field}: PFN_{name},");
+        let parameters: String = command
+            .parameters
+            .iter()
+            .map(|parameter| format!("_{}", declaration(parameter)))
+            .collect();
+        let _ = writeln!(
+            loads,
+            "{field}: {{
+                unsafe extern \"system\" fn {field}({parameters}) {{
+                    panic!(\"Unable to load {field}\")
+                }}
+                let function = load(c\"{name}\");
+                if function.is_null() {{
+                    {field}
+                }} else {{
+                    // SAFETY: the loader returns the function of that name, which has this type.
+                    unsafe {{ core::mem::transmute::<*const c_void, PFN_{name}>(function) }}
+                }}
+            }},"
+        );
+    }
+    let types: BTreeSet<String> = extension
+        .commands
+        .iter()
+        .flat_map(|command| {
+            let types = command.parameters.iter().map(|parameter| &parameter.ty);
+            let types = types.filter(|ty| ty.ends_with(TAG));
+            types
+                .map(|ty| rust_name(ty).to_owned())
+                .chain([format!("PFN_{}", command.name)])
+        })
+        .collect();
+    let types: Vec<String> = types.into_iter().collect();
+    let Extension {
+        name,
+        number,
+        revision,
+        ..
+    } = extension;
+    rust_file(
+        &format!(
+            "//! `{name}`: names, version and device-level functions.
+//!
+//! The module has the shape of ash's own extension modules (see [`ash::ext::mesh_shader`])."
+        ),
+        &format!(
+            "use core::ffi::{{CStr, c_void}};
+
+            use ash::vk;
+
+            use crate::ash_compat;
+            use crate::vk::{{{types}}};
+
+            /// The extension's name, for `ppEnabledExtensionNames`.
+            pub const NAME: &CStr = c\"{name}\";
+
+            /// The revision of the extension that this crate describes.
+            pub const SPEC_VERSION: u32 = {revision};
+
+            /// The extension number, which fixes the block of enum values: 1000000000 + (number - 1) * 1000.
+            ///
+            /// It is not registered with Khronos. It is far above the numbers that are.
+            pub const EXTENSION_NUMBER: u32 = {number};
+
+            /// {name} device-level functions.
+            #[derive(Clone)]
+            pub struct Device {{
+                fp: DeviceFn,
+                handle: vk::Device,
+            }}
+
+            impl Device {{
+                /// Loads the functions of `device`, on which the extension must be enabled.
+                ///
+                /// As everywhere in ash, a function that the device lacks is only noticed when it is called:
+                /// the call then ends the process with a message.
+                pub fn new(instance: &ash::Instance, device: &ash::Device) -> Self {{
+                    let handle = device.handle();
+                    let fp = DeviceFn::load(ash_compat::device_loader(instance, handle));
+                    Self {{ fp, handle }}
+                }}
+
+                /// The raw function pointers.
+                #[inline]
+                pub fn fp(&self) -> &DeviceFn {{
+                    &self.fp
+                }}
+
+                /// The device whose functions these are.
+                #[inline]
+                pub fn device(&self) -> vk::Device {{
+                    self.handle
+                }}
+
+                {calls}
+            }}
+
+            /// Raw {name} device-level function pointers.
+            #[derive(Clone)]
+            pub struct DeviceFn {{ {pointers} }}
+
+            impl DeviceFn {{
+                /// Loads every function through `load`, which takes a function's name and returns its address,
+                /// or null where there is none.
+                ///
+                /// What `load` returns must be null or the function of that name.
+                pub fn load<F: FnMut(&CStr) -> *const c_void>(mut load: F) -> Self {{
+                    Self {{ {loads} }}
+                }}
+            }}
+            ",
+            types = types.join(", ")
+        ),
+    )
+}
+
+/// The name of a command's function pointer.
+fn field_name(command: &Command) -> String {
+    let name = command.name.trim_start_matches("vk").replace(TAG, "");
+    let name = snake_case(&name);
+    format!("{}_{}", name.trim_start_matches('_'), TAG.to_lowercase())
+}
+
+/// Adds the method that calls a command's function: pointers to structures are references.
+fn add_command(calls: &mut String, comments: Comments<'_>, command: &Command) {
+    let field = field_name(command);
+    let tag = format!("_{}", TAG.to_lowercase());
+    let (mut parameters, mut arguments) = (String::new(), String::new());
+    for parameter in &command.parameters {
+        let name = parameter.rust_name();
+        let ty = parameter.rust_type();
+        let (name, ty) = match (name.strip_prefix("p_"), ty.strip_prefix("*const ")) {
+            (Some(name), Some(pointee)) => (name.to_owned(), format!("&{pointee}")),
+            _ => (name, ty),
+        };
+        let _ = write!(parameters, "{name}: {ty},");
+        let _ = write!(arguments, "{name},");
+    }
+    let _ = writeln!(
+        calls,
+        "{documentation}
+        ///
+        /// # Safety
+        ///
+        /// The valid usage of `{name}`, which the extension's specification states: handles belong to
+        /// [`Self::device`], access to them is synchronised, and structures and their `p_next` chains are valid.
+        #[doc(alias = \"{name}\")]
+        #[inline]
+        pub unsafe fn {method}(&self, {parameters}) {{
+            // SAFETY: the caller keeps the function's contract; references are live.
+            unsafe {{ (self.fp.{field})({arguments}) }}
+        }}",
+        documentation = comments.text(&command.comment, None).trim_end(),
+        name = command.name,
+        method = field.trim_end_matches(&tag),
+    );
+}

@@ -1,0 +1,155 @@
+//! The workspace as its manifests describe it: packages, their targets and what they depend on.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use toml::{Table, Value};
+
+/// The root of the workspace.
+pub fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+/// A package.
+#[derive(Debug)]
+pub struct Package {
+    pub name: String,
+    /// Its folder, from the root.
+    pub folder: String,
+    pub manifest: Table,
+}
+
+/// A package's dependency on another of the workspace.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Dependency {
+    /// The folder of the package that depends.
+    pub from: String,
+    /// The folder of the package that it depends on.
+    pub to: String,
+    /// It is for tests, examples and benchmarks only.
+    pub is_dev: bool,
+}
+
+fn read(path: &Path) -> Table {
+    let text = std::fs::read_to_string(path).expect("a manifest");
+    toml::from_str(&text).expect("TOML")
+}
+
+fn text<'a>(table: &'a Table, key: &str) -> Option<&'a str> {
+    table.get(key).and_then(Value::as_str)
+}
+
+/// All packages of the workspace.
+pub fn packages() -> Vec<Package> {
+    let root = root();
+    let members = read(&root.join("Cargo.toml"))["workspace"]["members"].clone();
+    let members = members.as_array().expect("members").iter();
+    members
+        .map(|member| {
+            let folder = member.as_str().expect("a path").to_owned();
+            let manifest = read(&root.join(&folder).join("Cargo.toml"));
+            let package = manifest["package"].as_table().expect("a package");
+            Package {
+                name: text(package, "name").expect("a name").to_owned(),
+                folder,
+                manifest,
+            }
+        })
+        .collect()
+}
+
+/// The dependencies of the workspace's packages on each other.
+pub fn dependencies() -> Vec<Dependency> {
+    let packages = packages();
+    let folders: BTreeMap<&str, &str> = packages
+        .iter()
+        .map(|package| (package.name.as_str(), package.folder.as_str()))
+        .collect();
+    let mut found = Vec::new();
+    for package in &packages {
+        let targets = package.manifest.get("target").and_then(Value::as_table);
+        let targets = targets.into_iter().flat_map(|targets| targets.values());
+        let tables = targets.filter_map(Value::as_table);
+        for table in tables.chain([&package.manifest]) {
+            for kind in ["dependencies", "dev-dependencies", "build-dependencies"] {
+                let listed = table.get(kind).and_then(Value::as_table);
+                for (key, value) in listed.into_iter().flatten() {
+                    // A dependency may be renamed.
+                    let name = value.get("package").and_then(Value::as_str).unwrap_or(key);
+                    if let Some(to) = folders.get(name) {
+                        found.push(Dependency {
+                            from: package.folder.clone(),
+                            to: (*to).to_owned(),
+                            is_dev: kind == "dev-dependencies",
+                        });
+                    }
+                }
+            }
+        }
+    }
+    found
+}
+
+/// A crate that is built: a library, a program, an example, a benchmark or a file of tests.
+#[derive(Clone, Debug)]
+pub struct Target {
+    /// The package's name, and the target's unless it is the library.
+    pub name: String,
+    /// The file of its root module.
+    pub root: PathBuf,
+}
+
+impl Package {
+    /// The crates that are built of it.
+    pub fn targets(&self) -> Vec<Target> {
+        let folder = root().join(&self.folder);
+        let mut found: BTreeMap<PathBuf, String> = BTreeMap::new();
+        let library = folder.join("src/lib.rs");
+        if library.exists() {
+            found.insert(library, self.name.clone());
+        }
+        for (kind, place) in [
+            ("bin", "src/bin"),
+            ("test", "tests"),
+            ("example", "examples"),
+            ("bench", "benches"),
+        ] {
+            let listed = self.manifest.get(kind).and_then(Value::as_array);
+            let tables = listed.into_iter().flatten().filter_map(Value::as_table);
+            for path in tables.filter_map(|table| text(table, "path")) {
+                found.insert(folder.join(path), self.target_name(Path::new(path)));
+            }
+            let automatic = std::fs::read_dir(folder.join(place)).into_iter().flatten();
+            for entry in automatic {
+                let path = entry.expect("an entry").path();
+                let root = path.join("main.rs");
+                if root.exists() {
+                    found.insert(root, self.target_name(&path));
+                } else if path.extension().is_some_and(|extension| extension == "rs")
+                    && !self.is_part_of_a_folder(&path)
+                {
+                    found.insert(path.clone(), self.target_name(&path));
+                }
+            }
+        }
+        let program = folder.join("src/main.rs");
+        if program.exists() {
+            found.insert(program.clone(), self.target_name(&program));
+        }
+        found
+            .into_iter()
+            .map(|(root, name)| Target { name, root })
+            .collect()
+    }
+
+    fn target_name(&self, path: &Path) -> String {
+        let stem = path.file_stem().expect("a name").to_string_lossy();
+        format!("{}/{stem}", self.name)
+    }
+
+    /// A file of a folder that is no place of cargo's own: the package of all tests has its folder there.
+    fn is_part_of_a_folder(&self, path: &Path) -> bool {
+        let parent = path.parent().expect("a folder");
+        parent.join("Cargo.toml").exists()
+    }
+}
