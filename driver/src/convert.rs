@@ -9,7 +9,7 @@ use simdevice::state::{
     ResolveMode, StencilFace, StencilOp, Topology, Viewport,
 };
 use simdevice::texture::{
-    AddressMode, BorderColor, ComponentSwizzle, Filter, IDENTITY, MipmapMode, Swizzle,
+    AddressMode, BorderColor, ComponentSwizzle, Filter, IDENTITY, MipmapMode, Swizzle, Reduction,
 };
 use std::ffi::{CStr, c_char};
 
@@ -337,11 +337,11 @@ pub(crate) fn custom_border_color(color: vk::ClearColorValue) -> BorderColor {
 ///
 /// # Errors
 /// [`Error::FeatureNotPresent`] for modes of extensions.
-pub(crate) fn reduction(mode: vk::SamplerReductionMode) -> Result<texture::Reduction, Error> {
+pub(crate) fn reduction(mode: vk::SamplerReductionMode) -> Result<Reduction, Error> {
     match mode {
-        vk::SamplerReductionMode::WEIGHTED_AVERAGE => Ok(texture::Reduction::WeightedAverage),
-        vk::SamplerReductionMode::MIN => Ok(texture::Reduction::Min),
-        vk::SamplerReductionMode::MAX => Ok(texture::Reduction::Max),
+        vk::SamplerReductionMode::WEIGHTED_AVERAGE => Ok(Reduction::WeightedAverage),
+        vk::SamplerReductionMode::MIN => Ok(Reduction::Min),
+        vk::SamplerReductionMode::MAX => Ok(Reduction::Max),
         other => Err(Error::FeatureNotPresent(format!(
             "reduction mode {other:?}"
         ))),

@@ -474,7 +474,7 @@ impl Renderer {
         let time = start.elapsed();
         let processor_time = processor.and_then(|start| Some(processor_time()? - start));
 
-        let pixels = (target.readback).read_new(width as usize * height as usize)?;
+        let pixels: Vec<[f32; 4]> = (target.readback).read_new(width as usize * height as usize)?;
         let depth = match &target.depths {
             None => None,
             Some((_, readback)) => {

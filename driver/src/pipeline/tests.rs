@@ -31,6 +31,7 @@ fn binding(number: u32, kind: vk::DescriptorType, count: u32) -> BindingInfo {
         count,
         stages: vk::ShaderStageFlags::ALL,
         immutable_samplers: Vec::new(),
+        flags: vk::DescriptorBindingFlags::empty(),
     }
 }
 
@@ -38,7 +39,7 @@ fn binding(number: u32, kind: vk::DescriptorType, count: u32) -> BindingInfo {
 fn layout(sets: Vec<BindingInfo>) -> PipelineLayout {
     let set = |info| {
         Some(Arc::new(
-            DescriptorSetLayout::new(vec![info], false).unwrap(),
+            DescriptorSetLayout::new(vec![info], vk::DescriptorSetLayoutCreateFlags::empty()).unwrap(),
         ))
     };
     PipelineLayout::new(sets.into_iter().map(set).collect(), &[], 0).unwrap()

@@ -57,7 +57,6 @@ impl VertexProjection {
         let components = components(state, &vertex.interface)?;
         let locations = vertex.interface.locations_read();
         let attributes = stages::attributes(info, &locations)?;
-        stages::check_attributes(&vertex.interface, &locations, &attributes)?;
         let resources = ProgramResources::new(device, &vertex.interface);
         let stream = |location| locations.iter().position(|(read, _)| *read == location);
         let programs = link::link_projection(vertex, stream, &components)?;
