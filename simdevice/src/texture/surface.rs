@@ -106,13 +106,13 @@ impl Surface {
             layout: None,
             writable: false,
         };
-        surface.layout = surface.find_packing();
+        surface.layout = surface.find_layout();
         Some(surface)
     }
 
     /// How its texels are read 16 at a time; None if they are to be read one by one.
-    fn find_packing(&self) -> Option<VectorLayout> {
-        let kind = TexelCodec::of(self.format)?;
+    fn find_layout(&self) -> Option<VectorLayout> {
+        let codec = TexelCodec::of(self.format)?;
         let begin = self.levels.iter().map(|level| level.offset).min()?;
         let end = self
             .levels
@@ -149,7 +149,7 @@ impl Surface {
             found.unwrap_or(otherwise)
         };
         Some(VectorLayout {
-            kind,
+            codec,
             words: (begin / 4) as usize..(end.min(self.memory.len()) / 4) as usize,
             levels: levels.collect::<Option<_>>()?,
             order: [
