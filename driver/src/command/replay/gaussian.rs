@@ -12,7 +12,7 @@ use crate::pipeline::gaussian::{
 use crate::pipeline::state::AttributeSource;
 use simdevice::Packet;
 use simdevice::packet::{
-    GaussianAppend, GaussianAttributes, GaussianBegin, ModelAttributes, GaussianFragmentStage,
+    GaussianAppend, GaussianAttributes, GaussianBegin, GaussianFragmentStage, ModelAttributes,
 };
 use simdevice::program::bindings::Bindings;
 use simdevice::state::gaussian::{
@@ -34,13 +34,15 @@ pub(crate) fn begin(state: &State, gaussian: &GaussianPipeline) -> Result<Vec<Pa
     }))];
     if let Some(stage) = &gaussian.resolve {
         let (sets, constants) = (&state.graphics_sets, &state.push_constants);
-        packets.push(Packet::GaussianFragmentStage(Box::new(GaussianFragmentStage {
-            program: Arc::clone(&stage.program),
-            bindings: descriptors::bindings(&stage.descriptors, sets, constants)?,
-            sample_shading: stage.sample_shading,
-            alpha_to_coverage: stage.alpha_to_coverage,
-            alpha_to_one: stage.alpha_to_one,
-        })));
+        packets.push(Packet::GaussianFragmentStage(Box::new(
+            GaussianFragmentStage {
+                program: Arc::clone(&stage.program),
+                bindings: descriptors::bindings(&stage.descriptors, sets, constants)?,
+                sample_shading: stage.sample_shading,
+                alpha_to_coverage: stage.alpha_to_coverage,
+                alpha_to_one: stage.alpha_to_one,
+            },
+        )));
     }
     Ok(packets)
 }
