@@ -14,7 +14,7 @@ use crate::stats::query::{QueryKind, host_time};
 use crate::stats::recorder::{DrawRecord, Owner};
 use crate::transfer::{self, Direction};
 use devmem::host::{self, OutOfMemory};
-use isa::exec::Stopped;
+use isa::machine::Stopped;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 

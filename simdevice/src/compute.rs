@@ -5,7 +5,7 @@ use crate::program::interface::ComputeInput;
 use crate::program::pool::PooledMachine;
 use crate::runtime::Runtime;
 use crate::stats::counters::{Counter, Counters};
-use isa::exec::{LaneMask, Machine, Stopped, Watchdog};
+use isa::machine::{LaneMask, Machine, Stopped, Watchdog};
 use isa::resources::Resources;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;

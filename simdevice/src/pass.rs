@@ -20,7 +20,7 @@ use crate::state::{Rect, ResolveMode};
 use crate::stats::counters::{Counter, Counters};
 use crate::stats::optimizations::Optimization;
 use devmem::host;
-use isa::exec::Stopped;
+use isa::machine::Stopped;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 

@@ -5,10 +5,11 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use isa::Options;
 use isa::builder::Builder;
-use isa::exec::{Executable, LaneMask, Machine, Options, Watchdog};
 use isa::ir::{Program, Rate, Type};
 use isa::level::SimdLevel;
+use isa::machine::{Executable, LaneMask, Machine, Watchdog};
 use isa::op::Op;
 use isa::resources::Resources;
 

@@ -35,7 +35,7 @@
 //! branch of an `If` runs if any lane takes it; a loop runs until no lane is left in it. `Break` and `Continue`
 //! name the construct that they leave by its [`ir::Label`]. Masks act at assignments, stores, atomics, image
 //! writes and subgroup operations; nothing else looks at them. Each loop's back edge checks the
-//! [`exec::Watchdog`].
+//! [`machine::Watchdog`].
 //!
 //! A **helper** lane (a fragment outside the primitive that completes a quad, or a demoted one) computes and
 //! assigns like any other, but its stores, atomics and image writes do nothing.
@@ -48,8 +48,8 @@
 //!
 //! # Life of a program
 //!
-//! [`builder::Builder`] → [`ir::Program`], checked → [`exec::Executable`] (optimized, registers allocated, control flow
-//! linearized, lanes fixed) → [`exec::Machine::run`], once a batch.
+//! [`builder::Builder`] → [`ir::Program`], checked → [`machine::Executable`] (optimized, registers allocated, control flow
+//! linearized, lanes fixed) → [`machine::Machine::run`], once a batch.
 //!
 //! # Modules
 //!
@@ -63,19 +63,14 @@ pub mod builder;
 mod compiler;
 pub mod ir;
 mod kernels;
-mod machine;
+pub mod machine;
 pub mod resources;
 
-/// The public face of the machine.
-pub mod exec {
-    pub use crate::compiler::Options;
-    pub use crate::kernels::combine;
-    pub use crate::kernels::registers::{Vector, Vector as Chunk};
-    pub use crate::machine::{Executable, LaneMask, Machine, Stopped, Watchdog, Work};
-}
-
+pub use compiler::Options;
 pub use devmem::level;
 pub use ir::{op, validate};
+pub use kernels::combine;
+pub use kernels::registers::Vector;
 
 #[cfg(test)]
 mod tests;

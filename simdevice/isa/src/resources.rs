@@ -85,7 +85,6 @@ pub(crate) fn load_word(words: &[AtomicU32], index: usize) -> Option<u32> {
 
 /// One register for the 16 lanes of a vector; floats as their bits.
 pub type LaneWords = [u32; VECTOR_LANES];
-pub use self::LaneWords as Lanes;
 
 /// How the level of detail of a sample is chosen; see [`crate::ir::Lod`].
 #[derive(Clone, Copy, Debug, PartialEq)]

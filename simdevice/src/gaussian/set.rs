@@ -7,7 +7,7 @@ use crate::packet::{Draw, GaussianAppend, GaussianBegin, GaussianFragmentStage};
 use crate::state::gaussian::GaussianGeometry;
 use crate::state::{Rect, Viewport};
 use devmem::host;
-use isa::exec::Stopped;
+use isa::machine::Stopped;
 
 /// The most groups of a set: a survivor is named by its group and its place there, in 32 bits.
 pub(super) const MAX_GROUPS: u64 = (1 << 32) / GROUP as u64;

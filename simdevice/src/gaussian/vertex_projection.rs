@@ -20,7 +20,7 @@ use crate::state::gaussian::{Camera, GaussianOrder};
 use crate::stats::counters::Counter;
 use devmem::{dispatch, host};
 use fearless_simd::{Level, Simd, prelude::*};
-use isa::exec::Stopped;
+use isa::machine::Stopped;
 use rayon::prelude::*;
 use std::sync::atomic::AtomicBool;
 use std::sync::atomic::Ordering::Relaxed;

@@ -4,7 +4,8 @@ use crate::format::{Format, Numeric};
 use crate::packet::{AttributeStream, Draw};
 use crate::program::interface::VertexInput;
 use crate::program::vertex::VERTEX_BATCH;
-use isa::exec::{Chunk, Machine};
+use isa::Vector;
+use isa::machine::Machine;
 
 /// A span of vertices is read whole where it has at most this many bytes for each vertex wanted.
 const SPAN_BYTES: u64 = 256;
@@ -135,9 +136,9 @@ impl<'a> Fetcher<'a> {
 }
 
 /// Sets an input's lanes from values; a uniform input takes the first.
-fn set_lanes<T>(chunks: &mut [Chunk], values: &[T], bits: impl Fn(&T) -> u32) {
+fn set_lanes<T>(chunks: &mut [Vector], values: &[T], bits: impl Fn(&T) -> u32) {
     if let ([chunk], Some(first)) = (&mut *chunks, values.first()) {
-        *chunk = Chunk([bits(first); 16]);
+        *chunk = Vector([bits(first); 16]);
         return;
     }
     for (chunk, values) in chunks.iter_mut().zip(values.chunks(16)) {
@@ -266,11 +267,11 @@ impl Out<'_> {
                 crate::format::Channel::A,
             ][component];
             let Some(place) = components.iter().position(|c| c.channel == wanted) else {
-                chunks.fill(Chunk([if component == 3 { one } else { 0 }; 16]));
+                chunks.fill(Vector([if component == 3 { one } else { 0 }; 16]));
                 continue;
             };
             if self.broadcast || chunks.len() == 1 {
-                chunks.fill(Chunk([words[place][0]; 16]));
+                chunks.fill(Vector([words[place][0]; 16]));
                 continue;
             }
             let used = count.div_ceil(16);
@@ -288,7 +289,7 @@ impl Out<'_> {
         for &(slot, component) in self.inputs {
             let chunks = self.machine.input_mut(slot);
             if self.broadcast {
-                chunks.fill(Chunk([texels[0][component].to_bits(); 16]));
+                chunks.fill(Vector([texels[0][component].to_bits(); 16]));
             } else {
                 set_lanes(chunks, texels, |texel| texel[component].to_bits());
             }

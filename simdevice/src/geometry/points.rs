@@ -8,7 +8,7 @@ use super::viewport::Transform;
 use crate::packet::Draw;
 use crate::runtime::Runtime;
 use crate::stats::counters::{Counter, Counters};
-use isa::exec::{Stopped, Watchdog};
+use isa::machine::{Stopped, Watchdog};
 use isa::resources::Resources;
 use std::sync::atomic::AtomicBool;
 

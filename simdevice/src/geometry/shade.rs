@@ -9,7 +9,8 @@ use crate::program::vertex::{VERTEX_BATCH, VertexOutputs};
 use devmem::dispatch;
 use devmem::host;
 use fearless_simd::Level;
-use isa::exec::{Chunk, LaneMask, Machine, Stopped, Watchdog};
+use isa::Vector;
+use isa::machine::{LaneMask, Machine, Stopped, Watchdog};
 use isa::resources::Resources;
 
 /// A vertex after the vertex program and the first viewport's transform.
@@ -99,7 +100,7 @@ impl Shader<'_> {
         let vertices = &mut shaded.vertices[first..];
         let lanes = outputs
             .position
-            .map(|slot| slot.map_or(&[][..], |slot| self.machine.output_chunks(slot)));
+            .map(|slot| slot.map_or(&[][..], |slot| self.machine.output_vectors(slot)));
         for (chunk, vertices) in vertices.chunks_mut(16).enumerate() {
             let mut position = [[0.0; 16]; 4];
             for (component, lanes) in position.iter_mut().zip(&lanes) {
@@ -135,7 +136,7 @@ impl Shader<'_> {
             host::resize(&mut shaded.varyings, first + count * per_vertex, 0);
             for (number, &slot) in outputs.varyings.iter().enumerate() {
                 let mut vertices = shaded.varyings[first..].chunks_exact_mut(per_vertex);
-                let chunks = slot.map_or(&[][..], |slot| self.machine.output_chunks(slot));
+                let chunks = slot.map_or(&[][..], |slot| self.machine.output_vectors(slot));
                 for chunk in chunks {
                     for (&bits, vertex) in chunk.0.iter().zip(&mut vertices) {
                         vertex[number] = bits;
@@ -206,7 +207,7 @@ fn for_lanes<T>(machine: &Machine, slot: Option<u32>, items: &mut [T], set: impl
     let Some(slot) = slot else {
         return;
     };
-    let chunks: &[Chunk] = machine.output_chunks(slot);
+    let chunks: &[Vector] = machine.output_vectors(slot);
     for (chunk, items) in chunks.iter().zip(items.chunks_mut(16)) {
         for (&bits, item) in chunk.0.iter().zip(items) {
             set(item, bits);

@@ -3,8 +3,9 @@
 use super::pool::MachinePool;
 use crate::program::interface::ComputeInput;
 use fearless_simd::Level;
-use isa::exec::{Executable, Options};
-use isa::ir::{CHUNK_LANES, Program};
+use isa::Options;
+use isa::ir::{Program, VECTOR_LANES};
+use isa::machine::Executable;
 use isa::validate::InvalidProgram;
 
 /// A program ready to be dispatched on one device.
@@ -32,7 +33,7 @@ impl ComputeProgram {
     ) -> Result<Self, InvalidProgram> {
         let invocations = invocations as usize;
         let options = Options {
-            lanes: invocations.next_multiple_of(CHUNK_LANES),
+            lanes: invocations.next_multiple_of(VECTOR_LANES),
             subgroup_size: subgroup_size as usize,
             count_work: true,
             level,

@@ -7,7 +7,8 @@ use crate::program::interface::{
 };
 use crate::stats::counters::Counters;
 use fearless_simd::Level;
-use isa::exec::{Executable, Machine, Options};
+use isa::Options;
+use isa::machine::{Executable, Machine};
 use isa::validate::InvalidProgram;
 
 /// Lanes of the two sizes of batches: few fragments are shaded in the smaller.

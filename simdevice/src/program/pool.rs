@@ -1,6 +1,6 @@
 //! Pools of machines, which programs lend to those who run them.
 
-use isa::exec::{Executable, Machine};
+use isa::machine::{Executable, Machine};
 use std::ops::{Deref, DerefMut};
 use std::sync::{Arc, Mutex, PoisonError};
 

@@ -7,8 +7,9 @@ use crate::program::interface::{
     DrawPrograms, FragmentInput, Interpolation, VertexInput, VertexOutput,
 };
 use fearless_simd::Level;
-use isa::exec::{Executable, Options};
+use isa::Options;
 use isa::ir::{Rate, Type};
+use isa::machine::Executable;
 use isa::validate::InvalidProgram;
 
 /// Vertices of a batch.

@@ -8,7 +8,7 @@ use crate::format::{Component, Format, MAX_TEXEL_SIZE, Numeric};
 use crate::simd::{as_floats, bits_of, floats_of};
 use crate::state::{BlendEquation, BlendFactor, BlendOp, BlendState, LogicOp};
 use fearless_simd::{Simd, f32x16, prelude::*, u32x16};
-use isa::exec::Chunk;
+use isa::Vector;
 
 /// A colour attachment as a draw writes it.
 #[derive(Clone, Debug)]
@@ -207,7 +207,7 @@ impl ColorOutput {
     pub fn write_tile<S: Simd>(
         &self,
         simd: S,
-        sources: &[[&[Chunk]; 4]; 2],
+        sources: &[[&[Vector]; 4]; 2],
         first: usize,
         words: &mut [u32],
     ) {
@@ -421,7 +421,7 @@ fn store_texels<S: Simd>([r, g, b, a]: &Colors<S>, words: &mut [u32]) {
 
 /// A source of 16 fragments; components that are not written are 0.
 #[inline(always)]
-pub fn load<S: Simd>(simd: S, source: &[&[Chunk]; 4], chunk: usize) -> Colors<S> {
+pub fn load<S: Simd>(simd: S, source: &[&[Vector]; 4], chunk: usize) -> Colors<S> {
     let mut color = [f32x16::splat(simd, 0.0); 4];
     for (component, lanes) in color.iter_mut().zip(source) {
         if let Some(lanes) = lanes.get(chunk) {

@@ -7,14 +7,15 @@ use crate::simd::as_floats;
 use crate::state::{BlendState, LogicOp};
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
-use isa::exec::{Chunk, Machine};
+use isa::Vector;
+use isa::machine::Machine;
 
 /// The components of both sources of an attachment, by chunk; those that are not written are empty.
-pub type Sources<'a> = [[&'a [Chunk]; 4]; 2];
+pub type Sources<'a> = [[&'a [Vector]; 4]; 2];
 
 /// The lanes that alpha covers, by sample of a pixel's.
 #[inline(always)]
-pub fn covered_by_alpha<S: Simd>(simd: S, alpha: &Chunk, samples: usize) -> [u16; 4] {
+pub fn covered_by_alpha<S: Simd>(simd: S, alpha: &Vector, samples: usize) -> [u16; 4] {
     let alpha = as_floats(simd, alpha);
     if samples == 1 {
         return [alpha.simd_ge(0.5).to_bitmask() as u16; 4];
@@ -27,8 +28,8 @@ pub fn covered_by_alpha<S: Simd>(simd: S, alpha: &Chunk, samples: usize) -> [u16
 }
 
 /// What a program wrote to a slot, if there is one.
-pub fn lanes_of(machine: &Machine, slot: Option<u32>) -> &[Chunk] {
-    slot.map_or(&[], |slot| machine.output_chunks(slot))
+pub fn lanes_of(machine: &Machine, slot: Option<u32>) -> &[Vector] {
+    slot.map_or(&[], |slot| machine.output_vectors(slot))
 }
 
 /// The tile buffers of a worker.

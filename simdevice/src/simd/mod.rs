@@ -6,8 +6,8 @@
 
 pub(crate) mod exp2;
 
-use fearless_simd::{Simd, f32x16, prelude::*, u32x16};
-use isa::exec::Chunk;
+use fearless_simd::{Simd, f32x4, f32x16, prelude::*, u32x16};
+use isa::Vector;
 
 /// The bits of floats.
 #[inline(always)]
@@ -23,8 +23,16 @@ pub(crate) fn floats_of<S: Simd>(bits: u32x16<S>) -> f32x16<S> {
 
 /// The floats that a chunk's lanes hold.
 #[inline(always)]
-pub(crate) fn as_floats<S: Simd>(simd: S, chunk: &Chunk) -> f32x16<S> {
+pub(crate) fn as_floats<S: Simd>(simd: S, chunk: &Vector) -> f32x16<S> {
     floats_of(u32x16::simd_from(simd, chunk.0))
+}
+
+/// A value of each quad for its lanes.
+#[inline(always)]
+pub(crate) fn spread<S: Simd>(simd: S, [a, b, c, d]: [f32; 4]) -> f32x16<S> {
+    let low = f32x4::splat(simd, a).combine(f32x4::splat(simd, b));
+    let high = f32x4::splat(simd, c).combine(f32x4::splat(simd, d));
+    low.combine(high)
 }
 
 /// `f` of both.

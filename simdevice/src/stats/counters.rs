@@ -1,7 +1,7 @@
 //! Counters of the work that the device does. They accumulate over a command processor's life; a query reads
 //! the difference between its end and its beginning.
 
-use isa::exec::Work;
+use isa::machine::Work;
 use isa::op::Kind;
 
 /// What a counter counts.

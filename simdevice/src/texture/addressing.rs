@@ -7,8 +7,8 @@
 use super::sampler::{AddressMode, Filter};
 use super::texels::Floats;
 use fearless_simd::{Simd, f32x16, i32x16, mask32x16, prelude::*, u32x16};
-use isa::ir::CHUNK_LANES;
-use isa::resources::Lanes;
+use isa::ir::VECTOR_LANES;
+use isa::resources::LaneWords;
 
 /// Floats from here on are integers: coordinates are whole periods.
 const WHOLE: f32 = 8_388_608.0;
@@ -109,7 +109,7 @@ pub(super) fn layer(coordinate: f32, layers: u32) -> u32 {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Axis {
     /// Indices within the image. Nearest filtering uses the first only.
-    pub index: [Lanes; 2],
+    pub index: [LaneWords; 2],
     /// Lanes whose texel isn't the border.
     pub inside: [u16; 2],
     /// Weight of the second.
@@ -121,9 +121,9 @@ pub(super) struct Axis {
 impl Axis {
     /// An axis that the image doesn't have.
     pub const FLAT: Self = Self {
-        index: [[0; CHUNK_LANES]; 2],
+        index: [[0; VECTOR_LANES]; 2],
         inside: [u16::MAX; 2],
-        weight: [0.0; CHUNK_LANES],
+        weight: [0.0; VECTOR_LANES],
         has_outside: false,
     };
 }
@@ -135,9 +135,9 @@ pub(super) fn axis<S: Simd>(
     mode: AddressMode,
     filter: Filter,
     normalized: bool,
-    coordinate: &Lanes,
-    size: &Lanes,
-    offset: &Lanes,
+    coordinate: &LaneWords,
+    size: &LaneWords,
+    offset: &LaneWords,
 ) -> Axis {
     simd.vectorize(
         #[inline(always)]
@@ -151,9 +151,9 @@ fn vector_axis<S: Simd>(
     mode: AddressMode,
     filter: Filter,
     normalized: bool,
-    coordinate: &Lanes,
-    size: &Lanes,
-    offset: &Lanes,
+    coordinate: &LaneWords,
+    size: &LaneWords,
+    offset: &LaneWords,
 ) -> Axis {
     let size = u32x16::simd_from(simd, *size).bitcast::<i32x16<S>>();
     let size = f32x16::float_from(size);
@@ -202,7 +202,7 @@ pub(super) struct VectorTaps<S: Simd> {
 pub(super) fn taps<S: Simd>(
     simd: S,
     mode: AddressMode,
-    coordinate: &Lanes,
+    coordinate: &LaneWords,
     size: f32x16<S>,
 ) -> VectorTaps<S> {
     let shifted = texel_coordinates(simd, mode, true, *coordinate, size) - 0.5;
@@ -220,7 +220,7 @@ fn texel_coordinates<S: Simd>(
     simd: S,
     mode: AddressMode,
     normalized: bool,
-    coordinate: Lanes,
+    coordinate: LaneWords,
     size: f32x16<S>,
 ) -> f32x16<S> {
     let zero = f32x16::splat(simd, 0.0);

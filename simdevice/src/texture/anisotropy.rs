@@ -8,7 +8,7 @@ use super::lod;
 use super::sampler::Sampler;
 use super::surface::Surface;
 use isa::ir::{CHUNK_LANES, Dimension};
-use isa::resources::{Lanes, LodRequest, SampleRequest};
+use isa::resources::{LaneWords, LodRequest, SampleRequest};
 
 /// The footprints of 16 lanes.
 struct Footprints {
@@ -25,8 +25,8 @@ pub(super) fn sample(
     surface: &Surface,
     sampler: &Sampler,
     request: &SampleRequest,
-    once: impl Fn(&SampleRequest) -> [Lanes; 4],
-) -> Option<[Lanes; 4]> {
+    once: impl Fn(&SampleRequest) -> [LaneWords; 4],
+) -> Option<[LaneWords; 4]> {
     let applies = sampler.max_anisotropy > 1.0
         && request.shape.dimension == Dimension::D2
         && request.gather.is_none()

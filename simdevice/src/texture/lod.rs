@@ -8,11 +8,11 @@ use super::sampler::{Filter, MipmapMode, Sampler};
 use super::surface::Surface;
 use crate::limits::MAX_LOD_BIAS;
 use crate::texture::texels::Floats;
-use isa::ir::{CHUNK_LANES, Dimension};
-use isa::resources::{Lanes, LodRequest, SampleRequest};
+use isa::ir::{Dimension, VECTOR_LANES};
+use isa::resources::{LaneWords, LodRequest, SampleRequest};
 
 /// Quads of a chunk.
-pub(super) const QUADS: usize = CHUNK_LANES / 4;
+pub(super) const QUADS: usize = VECTOR_LANES / 4;
 
 /// The mip levels of four quads, as [`Selection`] has them of lanes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,23 +58,23 @@ pub(super) fn select_quads(
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Selection {
     /// The level, or the larger of two.
-    pub high: [u32; CHUNK_LANES],
+    pub high: [u32; VECTOR_LANES],
     /// The smaller of two.
-    pub low: [u32; CHUNK_LANES],
+    pub low: [u32; VECTOR_LANES],
     /// The weight of `low`; if it is zero, `low` isn't read.
     pub weight: Floats,
     /// The filter within levels.
-    pub filter: [Filter; CHUNK_LANES],
+    pub filter: [Filter; VECTOR_LANES],
 }
 
 impl Selection {
     /// The first level for all.
     fn base(filter: Filter) -> Self {
         Self {
-            high: [0; CHUNK_LANES],
-            low: [0; CHUNK_LANES],
-            weight: [0.0; CHUNK_LANES],
-            filter: [filter; CHUNK_LANES],
+            high: [0; VECTOR_LANES],
+            low: [0; VECTOR_LANES],
+            weight: [0.0; VECTOR_LANES],
+            filter: [filter; VECTOR_LANES],
         }
     }
 }
@@ -122,7 +122,11 @@ pub(super) fn select(surface: &Surface, sampler: &Sampler, request: &SampleReque
 
 /// The answer to a query: the level that is read, relative to the view's first, and the level of detail before it is
 /// clamped.
-pub(super) fn query(surface: &Surface, sampler: &Sampler, request: &SampleRequest) -> [Lanes; 2] {
+pub(super) fn query(
+    surface: &Surface,
+    sampler: &Sampler,
+    request: &SampleRequest,
+) -> [LaneWords; 2] {
     let biased = biased(surface, sampler, request);
     let last = surface.levels.len() as f32 - 1.0;
     let level = clamped(sampler, request, &biased).map(|lambda| {
@@ -150,7 +154,7 @@ fn biased(surface: &Surface, sampler: &Sampler, request: &SampleRequest) -> Floa
         LodRequest::Explicit(lod) => lod.map(f32::from_bits),
         LodRequest::Automatic | LodRequest::Implicit { .. } => implicit(surface, request),
         LodRequest::Gradient { dx, dy, .. } => std::array::from_fn(|lane| {
-            let along = |d: &[Lanes; 3]| d.map(|lanes| f32::from_bits(lanes[lane]));
+            let along = |d: &[LaneWords; 3]| d.map(|lanes| f32::from_bits(lanes[lane]));
             let (x, y) = (along(dx), along(dy));
             scale_lod(surface, request, lane, x, y)
         }),
@@ -158,7 +162,7 @@ fn biased(surface: &Surface, sampler: &Sampler, request: &SampleRequest) -> Floa
     let mut biased = base;
     let operand = match &request.lod {
         LodRequest::Implicit { bias, .. } => bias,
-        _ => &[0; CHUNK_LANES],
+        _ => &[0; VECTOR_LANES],
     };
     for (lod, operand) in biased.iter_mut().zip(operand) {
         let bias = sampler.mip_lod_bias + f32::from_bits(*operand);
@@ -172,8 +176,8 @@ fn biased(surface: &Surface, sampler: &Sampler, request: &SampleRequest) -> Floa
 fn clamped(sampler: &Sampler, request: &SampleRequest, biased: &Floats) -> Floats {
     let minimum = match &request.lod {
         LodRequest::Implicit { minimum, .. } | LodRequest::Gradient { minimum, .. } => minimum,
-        LodRequest::Automatic => &[0; CHUNK_LANES],
-        LodRequest::Explicit(_) => &[f32::NEG_INFINITY.to_bits(); CHUNK_LANES],
+        LodRequest::Automatic => &[0; VECTOR_LANES],
+        LodRequest::Explicit(_) => &[f32::NEG_INFINITY.to_bits(); VECTOR_LANES],
     };
     let mut clamped = *biased;
     for (lod, minimum) in clamped.iter_mut().zip(minimum) {
@@ -195,7 +199,7 @@ fn implicit(surface: &Surface, request: &SampleRequest) -> Floats {
             scale_lod(surface, request, lane, dx, dy)
         });
     }
-    let mut lods = [0.0; CHUNK_LANES];
+    let mut lods = [0.0; VECTOR_LANES];
     let quads = of_quads(surface, request);
     for (lods, quad) in lods.chunks_exact_mut(4).zip(quads) {
         lods.fill(quad);

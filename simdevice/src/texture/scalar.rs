@@ -8,9 +8,9 @@ use super::lod;
 use super::sampler::{AddressMode, BorderColor, Filter, Reduction, Sampler};
 use super::surface::{Surface, Texel};
 use crate::format::{Channel, Numeric};
-use isa::exec::combine;
-use isa::ir::{AtomicOp, CHUNK_LANES, Dimension, Format as Word, ImageShape};
-use isa::resources::{Lanes, SampleRequest, TexelRequest};
+use isa::combine;
+use isa::ir::{AtomicOp, Dimension, Format as Word, ImageShape, VECTOR_LANES};
+use isa::resources::{LaneWords, SampleRequest, TexelRequest};
 
 /// What is read of an image: where, and through which sampler.
 struct Reader<'a> {
@@ -25,11 +25,15 @@ struct Reader<'a> {
 }
 
 /// Filters or gathers for every lane of the mask.
-pub(super) fn sample(surface: &Surface, sampler: &Sampler, request: &SampleRequest) -> [Lanes; 4] {
+pub(super) fn sample(
+    surface: &Surface,
+    sampler: &Sampler,
+    request: &SampleRequest,
+) -> [LaneWords; 4] {
     let selection = lod::select(surface, sampler, request);
     let border = border_texel(surface, sampler);
-    let mut out = [[0; CHUNK_LANES]; 4];
-    for lane in (0..CHUNK_LANES).filter(|lane| request.mask >> lane & 1 != 0) {
+    let mut out = [[0; VECTOR_LANES]; 4];
+    for lane in (0..VECTOR_LANES).filter(|lane| request.mask >> lane & 1 != 0) {
         let mut reader = Reader {
             surface,
             sampler,
@@ -320,12 +324,12 @@ fn place(shape: ImageShape, request: &TexelRequest, lane: usize) -> Texel {
 /// The lanes that take part, in order.
 fn lanes(request: &TexelRequest) -> impl Iterator<Item = usize> {
     let mask = request.mask;
-    (0..CHUNK_LANES).filter(move |lane| mask >> lane & 1 != 0)
+    (0..VECTOR_LANES).filter(move |lane| mask >> lane & 1 != 0)
 }
 
 /// Reads texels.
-pub(super) fn read(surface: &Surface, request: &TexelRequest) -> [Lanes; 4] {
-    let mut out = [[0; CHUNK_LANES]; 4];
+pub(super) fn read(surface: &Surface, request: &TexelRequest) -> [LaneWords; 4] {
+    let mut out = [[0; VECTOR_LANES]; 4];
     for lane in lanes(request) {
         let texel = place(request.shape, request, lane);
         let texel = surface.texel(request.level[lane] as usize, texel);
@@ -338,7 +342,7 @@ pub(super) fn read(surface: &Surface, request: &TexelRequest) -> [Lanes; 4] {
 }
 
 /// Writes texels.
-pub(super) fn write(surface: &Surface, request: &TexelRequest, texel: &[Lanes; 4]) {
+pub(super) fn write(surface: &Surface, request: &TexelRequest, texel: &[LaneWords; 4]) {
     if !surface.writable {
         return;
     }
@@ -373,10 +377,10 @@ pub(super) fn atomic(
     surface: &Surface,
     request: &TexelRequest,
     op: AtomicOp,
-    value: &Lanes,
-    comparator: &Lanes,
-) -> Lanes {
-    let mut old = [0; CHUNK_LANES];
+    value: &LaneWords,
+    comparator: &LaneWords,
+) -> LaneWords {
+    let mut old = [0; VECTOR_LANES];
     let one_word = surface.texel_size == 4 && surface.format.components().len() == 1;
     if !surface.writable || !one_word {
         return old;

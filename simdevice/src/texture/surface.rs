@@ -106,12 +106,12 @@ impl Surface {
             layout: None,
             writable: false,
         };
-        surface.layout = surface.find_packing();
+        surface.layout = surface.find_layout();
         Some(surface)
     }
 
     /// How its texels are read 16 at a time; None if they are to be read one by one.
-    fn find_packing(&self) -> Option<VectorLayout> {
+    fn find_layout(&self) -> Option<VectorLayout> {
         let codec = TexelCodec::of(self.format)?;
         let begin = self.levels.iter().map(|level| level.offset).min()?;
         let end = self

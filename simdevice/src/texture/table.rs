@@ -8,7 +8,7 @@ use super::surface::Surface;
 use super::view::ImageBinding;
 use super::{anisotropy, lod, scalar, vector};
 use isa::ir::{AtomicOp, Dimension, ImageShape};
-use isa::resources::{ImageUnit, Lanes, SampleRequest, TexelRequest};
+use isa::resources::{ImageUnit, LaneWords, SampleRequest, TexelRequest};
 
 /// The images and samplers of a draw or a dispatch, by the slots that its program names.
 ///
@@ -61,7 +61,7 @@ impl ImageTable {
         surface: &Surface,
         sampler: &Sampler,
         request: &SampleRequest,
-    ) -> [Lanes; 4] {
+    ) -> [LaneWords; 4] {
         let batched = if self.batched {
             dispatch!(self.level, simd => {
                 match vector::bilinear(simd, surface, sampler, request) {
@@ -82,7 +82,7 @@ impl ImageTable {
 }
 
 impl ImageUnit for ImageTable {
-    fn sample(&self, image: u32, sampler: u32, request: &SampleRequest) -> [Lanes; 4] {
+    fn sample(&self, image: u32, sampler: u32, request: &SampleRequest) -> [LaneWords; 4] {
         let Some((surface, sampler)) = self.pair(image, sampler) else {
             return Default::default();
         };
@@ -96,12 +96,12 @@ impl ImageUnit for ImageTable {
         once(request)
     }
 
-    fn read(&self, image: u32, request: &TexelRequest) -> [Lanes; 4] {
+    fn read(&self, image: u32, request: &TexelRequest) -> [LaneWords; 4] {
         self.surface(image)
             .map_or_else(Default::default, |surface| scalar::read(surface, request))
     }
 
-    fn write(&self, image: u32, request: &TexelRequest, texel: &[Lanes; 4]) {
+    fn write(&self, image: u32, request: &TexelRequest, texel: &[LaneWords; 4]) {
         if let Some(surface) = self.surface(image) {
             scalar::write(surface, request, texel);
         }
@@ -112,9 +112,9 @@ impl ImageUnit for ImageTable {
         image: u32,
         request: &TexelRequest,
         op: AtomicOp,
-        value: &Lanes,
-        comparator: &Lanes,
-    ) -> Lanes {
+        value: &LaneWords,
+        comparator: &LaneWords,
+    ) -> LaneWords {
         self.surface(image)
             .map_or_else(Default::default, |surface| {
                 scalar::atomic(surface, request, op, value, comparator)
@@ -149,7 +149,7 @@ impl ImageUnit for ImageTable {
         self.surface(image).map_or(0, |surface| surface.samples)
     }
 
-    fn lod(&self, image: u32, sampler: u32, request: &SampleRequest) -> [Lanes; 2] {
+    fn lod(&self, image: u32, sampler: u32, request: &SampleRequest) -> [LaneWords; 2] {
         self.pair(image, sampler)
             .map_or_else(Default::default, |(surface, sampler)| {
                 lod::query(surface, sampler, request)

@@ -13,8 +13,8 @@ use fearless_simd::{Simd, f32x8, f32x16, i32x8, u32x8, u32x16};
 
 use crate::format::Format;
 use crate::format::unorm8::unorm8_fraction_8;
-use isa::ir::CHUNK_LANES;
-use isa::resources::Lanes;
+use isa::ir::VECTOR_LANES;
+use isa::resources::LaneWords;
 
 /// How texels lie in words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,7 +59,7 @@ impl VectorLayout {
 }
 
 impl TexelCodec {
-    /// The kind of a format; None if its texels are to be read one by one.
+    /// The codec of a format; None if its texels are to be read one by one.
     pub fn of(format: Format) -> Option<Self> {
         Some(match format {
             Format::R8Unorm => Self::Unorm8,
@@ -82,16 +82,16 @@ impl TexelCodec {
 /// Two columns and two rows of texels for each of 16 lanes.
 pub(super) struct Rows<'a> {
     /// The first texel of the lane's level, layer and slice.
-    pub base: Lanes,
-    pub row_pitch: Lanes,
-    pub x: &'a [Lanes; 2],
-    pub y: &'a [Lanes; 2],
+    pub base: LaneWords,
+    pub row_pitch: LaneWords,
+    pub x: &'a [LaneWords; 2],
+    pub y: &'a [LaneWords; 2],
 }
 
 /// Calls a kernel for a [`TexelCodec`], compiled on its own.
 macro_rules! for_codec {
-    ($simd:expr, $kind:expr, $kernel:ident($($argument:expr),*)) => {
-        match $kind {
+    ($simd:expr, $codec:expr, $kernel:ident($($argument:expr),*)) => {
+        match $codec {
             TexelCodec::Unorm8 => for_codec!($simd, $kernel, Unorm8, $($argument),*),
             TexelCodec::Unorm8x2 => for_codec!($simd, $kernel, Unorm8x2, $($argument),*),
             TexelCodec::Unorm8x4 => for_codec!($simd, $kernel, Unorm8x4, $($argument),*),
@@ -102,10 +102,10 @@ macro_rules! for_codec {
             TexelCodec::Float32x4 => for_codec!($simd, $kernel, Float32x4, $($argument),*),
         }
     };
-    ($simd:expr, $kernel:ident, $kind:ident, $($argument:expr),*) => {
+    ($simd:expr, $kernel:ident, $codec:ident, $($argument:expr),*) => {
         $simd.vectorize(
             #[inline(always)]
-            || $kernel::<S, $kind>($simd, $($argument),*),
+            || $kernel::<S, $codec>($simd, $($argument),*),
         )
     };
 }
@@ -159,7 +159,7 @@ fn load<S: Simd, T: Texels>(
     let (first, second) = index.split();
     let first = T::load(simd, words, first);
     let second = T::load(simd, words, second);
-    let mut out = [[0.0; CHUNK_LANES]; 4];
+    let mut out = [[0.0; VECTOR_LANES]; 4];
     for c in 0..T::COMPONENTS {
         out[c] = first[c].combine(second[c]).into();
     }
@@ -186,7 +186,7 @@ fn bilinear<S: Simd, T: Texels>(
         ],
     };
     let texel = around.filter::<T>(simd, words);
-    let mut out = [[0.0; CHUNK_LANES]; 4];
+    let mut out = [[0.0; VECTOR_LANES]; 4];
     for c in 0..T::COMPONENTS {
         out[c] = texel[c].into();
     }
@@ -453,7 +453,7 @@ impl Texels for Float32x4 {
 }
 
 /// A float for each of 16 lanes.
-pub(super) type Floats = [f32; CHUNK_LANES];
+pub(super) type Floats = [f32; VECTOR_LANES];
 
 #[cfg(test)]
 mod tests {

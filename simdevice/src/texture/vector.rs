@@ -9,7 +9,7 @@
 
 use std::sync::atomic::AtomicU32;
 
-use fearless_simd::{Simd, f32x4, f32x16, prelude::*, u32x4, u32x16};
+use fearless_simd::{Simd, f32x16, prelude::*, u32x4, u32x16};
 
 use super::addressing::{self, Axis, axis, taps};
 use super::cube;
@@ -21,10 +21,11 @@ use super::texels::{
     Footprint2x2, PackedLevel, Rows, Srgb8x4, TexelCodec, Texels, Unorm8x4, VectorLayout,
 };
 use crate::format::Numeric;
+use crate::simd::spread;
 use crate::state::CompareOp;
 use crate::texture::texels::Floats;
-use isa::ir::{CHUNK_LANES, Dimension};
-use isa::resources::{Lanes, LodRequest, SampleRequest};
+use isa::ir::{Dimension, VECTOR_LANES};
+use isa::resources::{LaneWords, LodRequest, SampleRequest};
 
 /// The components of 16 texels.
 type Components = [Floats; 4];
@@ -47,7 +48,7 @@ pub(super) fn general<S: Simd>(
     surface: &Surface,
     sampler: &Sampler,
     request: &SampleRequest,
-) -> Option<[Lanes; 4]> {
+) -> Option<[LaneWords; 4]> {
     let layout = surface.layout.as_ref()?;
     let shape = request.shape;
     let is_mean = sampler.reduction == Reduction::WeightedAverage;
@@ -78,16 +79,16 @@ pub(super) fn general<S: Simd>(
 impl<S: Simd> Batch<'_, S> {
     /// Stored components as a program gets them.
     #[inline(always)]
-    fn registers(&self, texels: &Components) -> [Lanes; 4] {
+    fn registers(&self, texels: &Components) -> [LaneWords; 4] {
         let components = self.layout.codec.components();
-        let (zero, one) = ([0.0; CHUNK_LANES], [1.0; CHUNK_LANES]);
+        let (zero, one) = ([0.0; VECTOR_LANES], [1.0; VECTOR_LANES]);
         let mut registers = [&zero, &zero, &zero, &one];
         for (register, stored) in registers.iter_mut().zip(self.layout.order) {
             if stored < components {
                 *register = &texels[stored];
             }
         }
-        let mut out = [[0; CHUNK_LANES]; 4];
+        let mut out = [[0; VECTOR_LANES]; 4];
         for (out, from) in out.iter_mut().zip(self.surface.swizzle) {
             *out = bytemuck::cast(*from.pick(&registers, &zero, &one));
         }
@@ -99,14 +100,14 @@ impl<S: Simd> Batch<'_, S> {
     fn select_filter(&self, selection: &Selection) -> Option<Components> {
         let first = selection.filter[0];
         let mut texels = self.select_levels(selection, first)?;
-        if selection.filter != [first; CHUNK_LANES] {
+        if selection.filter != [first; VECTOR_LANES] {
             let other = match first {
                 Filter::Nearest => Filter::Linear,
                 Filter::Linear => Filter::Nearest,
             };
             let others = self.select_levels(selection, other)?;
             for (texel, other) in texels.iter_mut().zip(&others) {
-                for lane in 0..CHUNK_LANES {
+                for lane in 0..VECTOR_LANES {
                     if selection.filter[lane] != first {
                         texel[lane] = other[lane];
                     }
@@ -127,7 +128,7 @@ impl<S: Simd> Batch<'_, S> {
         let low = self.filter_level(&selection.low, filter)?;
         let mut texels = mix(&high, &low, &selection.weight);
         for (texel, high) in texels.iter_mut().zip(&high) {
-            for lane in 0..CHUNK_LANES {
+            for lane in 0..VECTOR_LANES {
                 // A level of weight zero isn't read, though it be infinite.
                 texel[lane] = if selection.weight[lane] > 0.0 {
                     texel[lane]
@@ -141,7 +142,7 @@ impl<S: Simd> Batch<'_, S> {
 
     /// Of one level for each lane; None if some lie across the edge of a cube's face. Compiled on its own.
     #[inline(always)]
-    fn filter_level(&self, levels: &Lanes, filter: Filter) -> Option<Components> {
+    fn filter_level(&self, levels: &LaneWords, filter: Filter) -> Option<Components> {
         self.simd.vectorize(
             #[inline(always)]
             || self.footprint(levels, filter),
@@ -149,7 +150,7 @@ impl<S: Simd> Batch<'_, S> {
     }
 
     #[inline(always)]
-    fn footprint(&self, levels: &Lanes, filter: Filter) -> Option<Components> {
+    fn footprint(&self, levels: &LaneWords, filter: Filter) -> Option<Components> {
         let face = (self.request.shape.dimension == Dimension::Cube).then(|| self.faces());
         let (faces, coordinate) = match &face {
             Some((faces, coordinate)) => (Some(faces), coordinate),
@@ -213,10 +214,10 @@ impl<S: Simd> Batch<'_, S> {
 
     /// Where the lanes' directions meet a cube: the face, and the coordinates on it.
     #[inline(always)]
-    fn faces(&self) -> (Lanes, [Lanes; 4]) {
-        let mut faces = [0; CHUNK_LANES];
-        let mut coordinate = [[0; CHUNK_LANES]; 4];
-        for lane in 0..CHUNK_LANES {
+    fn faces(&self) -> (LaneWords, [LaneWords; 4]) {
+        let mut faces = [0; VECTOR_LANES];
+        let mut coordinate = [[0; VECTOR_LANES]; 4];
+        for lane in 0..VECTOR_LANES {
             let direction = [0, 1, 2].map(|axis| self.request.coordinate[axis][lane]);
             let hit = cube::Hit::new(direction.map(f32::from_bits));
             let [s, t] = hit.coordinates();
@@ -228,7 +229,7 @@ impl<S: Simd> Batch<'_, S> {
 
     /// The layer of each lane; None if it is the first for all.
     #[inline(always)]
-    fn layers(&self, faces: Option<&Lanes>) -> Option<Lanes> {
+    fn layers(&self, faces: Option<&LaneWords>) -> Option<LaneWords> {
         let shape = self.request.shape;
         if !shape.arrayed {
             return faces.copied();
@@ -249,7 +250,7 @@ impl<S: Simd> Batch<'_, S> {
         &self,
         number: usize,
         filter: Filter,
-        coordinate: &[Lanes; 4],
+        coordinate: &[LaneWords; 4],
         sizes: &LevelSizes<'_>,
     ) -> Axis {
         let size = match number {
@@ -264,7 +265,7 @@ impl<S: Simd> Batch<'_, S> {
                 Filter::Nearest => AddressMode::ClampToEdge,
                 Filter::Linear => AddressMode::ClampToBorder,
             };
-            let offset = [0; CHUNK_LANES];
+            let offset = [0; VECTOR_LANES];
             return axis(self.simd, mode, filter, true, coordinate, &size, &offset);
         }
         axis(
@@ -293,8 +294,8 @@ impl<S: Simd> Batch<'_, S> {
         // A cube's outside is that of lanes that nobody asks for.
         let plain = self.reference.is_none() && (!bordered || dimension == Dimension::Cube);
         if filter == Filter::Linear && dimension != Dimension::D1 && plain {
-            let kind = self.layout.codec;
-            return kind.bilinear(self.simd, words, rows, &x.weight, &y.weight);
+            let codec = self.layout.codec;
+            return codec.bilinear(self.simd, words, rows, &x.weight, &y.weight);
         }
         let texel = |i: usize, j: usize| {
             let inside = x.inside[i] & y.inside[j] & within[0];
@@ -322,7 +323,7 @@ impl<S: Simd> Batch<'_, S> {
             let border = border_texel(self.surface, self.sampler).map(f32::from_bits);
             for (register, stored) in self.layout.order.into_iter().enumerate() {
                 if stored < self.layout.codec.components() {
-                    for lane in (0..CHUNK_LANES).filter(|lane| inside >> lane & 1 == 0) {
+                    for lane in (0..VECTOR_LANES).filter(|lane| inside >> lane & 1 == 0) {
                         texels[stored][lane] = border[register];
                     }
                 }
@@ -357,9 +358,9 @@ impl<'a> LevelSizes<'a> {
 
     /// A number of each lane's level.
     #[inline(always)]
-    fn of(&self, value: impl Fn(&PackedLevel) -> u32) -> Lanes {
+    fn of(&self, value: impl Fn(&PackedLevel) -> u32) -> LaneWords {
         match self.uniform {
-            Some(level) => [value(level); CHUNK_LANES],
+            Some(level) => [value(level); VECTOR_LANES],
             None => self.levels.map(|level| value(&self.table[level as usize])),
         }
     }
@@ -367,8 +368,8 @@ impl<'a> LevelSizes<'a> {
 
 /// Moves texels on by some steps.
 #[inline(always)]
-fn advance(base: &mut Lanes, steps: &Lanes, pitch: &Lanes) {
-    for lane in 0..CHUNK_LANES {
+fn advance(base: &mut Lanes, steps: &LaneWords, pitch: &LaneWords) {
+    for lane in 0..VECTOR_LANES {
         base[lane] = base[lane].wrapping_add(steps[lane].wrapping_mul(pitch[lane]));
     }
 }
@@ -403,7 +404,7 @@ fn compare(op: CompareOp, reference: &Floats, depths: &mut Floats) {
 fn mix(a: &Components, b: &Components, weight: &Floats) -> Components {
     let mut mixed = *a;
     for (mixed, b) in mixed.iter_mut().zip(b) {
-        for lane in 0..CHUNK_LANES {
+        for lane in 0..VECTOR_LANES {
             mixed[lane] += weight[lane] * (b[lane] - mixed[lane]);
         }
     }
@@ -417,7 +418,7 @@ pub(super) fn bilinear<S: Simd>(
     surface: &Surface,
     sampler: &Sampler,
     request: &SampleRequest,
-) -> Option<[Lanes; 4]> {
+) -> Option<[LaneWords; 4]> {
     let layout = surface.layout.as_ref()?;
     if !is_plain(sampler, request) {
         return None;
@@ -465,7 +466,7 @@ fn filter<S: Simd, T: Texels>(
     layout: &VectorLayout,
     sampler: &Sampler,
     request: &SampleRequest,
-) -> [Lanes; 4] {
+) -> [LaneWords; 4] {
     let words = layout.words(&surface.memory);
     let selection = lod::select_quads(surface, sampler, request);
     let mut texel = level::<S, T>(simd, words, layout, sampler, request, &selection.high);
@@ -540,13 +541,6 @@ fn of_each<T: Copy + Default>(
     values
 }
 
-/// A number of each quad for its lanes.
-#[inline(always)]
-fn spread<S: Simd>(simd: S, [a, b, c, d]: [f32; QUADS]) -> f32x16<S> {
-    let upper = f32x4::splat(simd, a).combine(f32x4::splat(simd, b));
-    upper.combine(f32x4::splat(simd, c).combine(f32x4::splat(simd, d)))
-}
-
 /// As [`spread`], of integers.
 #[inline(always)]
 fn spread_words<S: Simd>(simd: S, [a, b, c, d]: [u32; QUADS]) -> u32x16<S> {
@@ -560,17 +554,17 @@ fn registers<S: Simd>(
     surface: &Surface,
     layout: &VectorLayout,
     texel: [f32x16<S>; 4],
-) -> [Lanes; 4] {
-    let mut stored = [[0.0; CHUNK_LANES]; 4];
+) -> [LaneWords; 4] {
+    let mut stored = [[0.0; VECTOR_LANES]; 4];
     for c in 0..4 {
         stored[c] = texel[c].into();
     }
-    let (zero, one) = ([0.0; CHUNK_LANES], [1.0; CHUNK_LANES]);
+    let (zero, one) = ([0.0; VECTOR_LANES], [1.0; VECTOR_LANES]);
     let mut found = [&zero; 4];
     for c in 0..4 {
         found[c] = &stored[layout.order[c]];
     }
-    let mut out = [[0; CHUNK_LANES]; 4];
+    let mut out = [[0; VECTOR_LANES]; 4];
     for (out, from) in out.iter_mut().zip(surface.swizzle) {
         *out = bytemuck::cast(*from.pick(&found, &zero, &one));
     }

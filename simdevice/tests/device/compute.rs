@@ -2,8 +2,8 @@
 
 use simdevice::command_processor::ExecutionError;
 use simdevice::isa::builder::Builder;
-use simdevice::isa::exec::Stopped;
 use simdevice::isa::ir::{Address, Binding, Format, Label, Program, Rate, Space, Statement, Type};
+use simdevice::isa::machine::Stopped;
 use simdevice::isa::op::Op;
 use simdevice::packet::{BufferRange, Dispatch};
 use simdevice::program::bindings::Bindings;

@@ -10,7 +10,7 @@ use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Rate, Type};
 use simdevice::packet::{
     Attachment, AttributeStream, BufferRange, Draw, GaussianAppend, GaussianAttributes,
-    GaussianBegin, LoadOp, ModelAttributes, Rendering, GaussianFragmentStage, StoreOp,
+    GaussianBegin, GaussianFragmentStage, LoadOp, ModelAttributes, Rendering, StoreOp,
 };
 use simdevice::program::bindings::Bindings;
 use simdevice::program::interface::{DrawPrograms, VertexInput, VertexOutput, gaussian};

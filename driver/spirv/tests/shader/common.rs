@@ -8,7 +8,8 @@ use fearless_simd::Level;
 use gaurast_spirv::{
     BuiltIn, InputSource, Module, Options, Shader, Specialization, Stage, translate,
 };
-use isa::exec::{Executable, LaneMask, Machine, Options as ExecOptions, Stopped, Watchdog};
+use isa::Options as ExecOptions;
+use isa::machine::{Executable, LaneMask, Machine, Stopped, Watchdog};
 use isa::resources::{GlobalMemory, NoGlobalMemory, Resources, words};
 
 /// The folder of the shaders.

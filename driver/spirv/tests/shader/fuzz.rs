@@ -6,7 +6,8 @@ use crate::common::{OPTIONS, Random, all_shaders, stage_of, words_of};
 use fearless_simd::Level;
 use gaurast_runner::{Case, shards};
 use gaurast_spirv::{Module, Specialization, translate};
-use isa::exec::{Executable, Options as ExecOptions};
+use isa::Options as ExecOptions;
+use isa::machine::Executable;
 
 /// Translates if it can, and prepares what comes of it for the device. Returns whether that worked.
 fn attempt(name: &str, words: &[u32]) -> bool {

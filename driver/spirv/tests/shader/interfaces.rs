@@ -9,7 +9,8 @@ use gaurast_spirv::{
     BuiltIn, DepthMode, DescriptorKind, InputSource, Interface, Interpolation, Module,
     OutputTarget, Sampling, ScalarType, Specialization,
 };
-use isa::exec::{Executable, LaneMask, Machine, Options as ExecOptions, Watchdog};
+use isa::Options as ExecOptions;
+use isa::machine::{Executable, LaneMask, Machine, Watchdog};
 use isa::resources::{Resources, words};
 
 const FLOAT: ScalarType = ScalarType::Float { width: 32 };

@@ -12,7 +12,7 @@ use crate::pipeline::gaussian::{
 use crate::pipeline::state::AttributeSource;
 use simdevice::Packet;
 use simdevice::packet::{
-    GaussianAppend, GaussianAttributes, GaussianBegin, ModelAttributes, GaussianFragmentStage,
+    GaussianAppend, GaussianAttributes, GaussianBegin, GaussianFragmentStage, ModelAttributes,
 };
 use simdevice::program::bindings::Bindings;
 use simdevice::state::gaussian::{

@@ -36,7 +36,7 @@ pub struct Options {
     /// Lanes of a subgroup: a power of two, at least 4 and at most [`MAX_SUBGROUP_SIZE`]. The last subgroup of a batch may
     /// be smaller.
     pub subgroup_size: usize,
-    /// Whether to count the work done (see [`crate::exec::Machine::take_work`]).
+    /// Whether to count the work done (see [`crate::machine::Machine::take_work`]).
     pub count_work: bool,
     /// The SIMD level of the kernels.
     pub level: Level,

@@ -16,5 +16,5 @@ pub use program::{
     Constant, Input, MAX_LANES, MAX_MEMORY_BYTES, MAX_NESTING, MAX_SUBGROUP_SIZE, Output, Program,
     Rate,
 };
-pub use register::{Reg, Register, Role, Type, VECTOR_LANES, VECTOR_LANES as CHUNK_LANES};
+pub use register::{Reg, Register, Role, Type, VECTOR_LANES};
 pub use statement::{Axis, Block, Case, Label, Statement, SubgroupOp, is_reducible};

@@ -8,7 +8,7 @@
 //! use std::sync::Arc;
 //! use fearless_simd::Level;
 //! use isa::{
-//!     builder::Builder, exec::{Executable, LaneMask, Machine, Options, Watchdog}, ir::{Rate, Type}, op::Op,
+//!     builder::Builder, machine::{Executable, LaneMask, Machine, Watchdog}, Options, ir::{Rate, Type}, op::Op,
 //!     resources::Resources,
 //! };
 //!
@@ -167,7 +167,7 @@ impl Machine {
     }
 
     /// An output's lanes after a batch: 16 to a vector (8 for `B64`). Empty if the program has no such output.
-    pub fn output_chunks(&self, slot: u32) -> &[Vector] {
+    pub fn output_vectors(&self, slot: u32) -> &[Vector] {
         let output = self
             .executable
             .program
@@ -179,14 +179,14 @@ impl Machine {
 
     /// One lane of a 32-bit output; zero if the program has no such output.
     pub fn output(&self, slot: u32, lane: usize) -> u32 {
-        self.output_chunks(slot)
+        self.output_vectors(slot)
             .get(lane / 16)
             .map_or(0, |vector| vector.0[lane % 16])
     }
 
     /// One lane of a 64-bit output.
     pub fn output64(&self, slot: u32, lane: usize) -> u64 {
-        self.output_chunks(slot).get(lane / 8).map_or(0, |vector| {
+        self.output_vectors(slot).get(lane / 8).map_or(0, |vector| {
             u64::from(vector.0[2 * (lane % 8)]) | u64::from(vector.0[2 * (lane % 8) + 1]) << 32
         })
     }

@@ -3,11 +3,11 @@
 use std::sync::{Arc, Mutex};
 
 use crate::builder::Builder;
-use crate::exec::{LaneMask, Watchdog};
 use crate::ir::{
     Address, AtomicOp, Binding, Dimension, Format, ImageRead, ImageShape, ImageWrite, Program,
     Rate, Reg, Space, Statement, Type,
 };
+use crate::machine::{LaneMask, Watchdog};
 use crate::op::Op;
 use crate::resources::{
     GlobalMemory, ImageUnit, LaneWords, NoImages, Resources, SampleRequest, TexelRequest, words,

@@ -14,8 +14,9 @@ use std::sync::Arc;
 use fearless_simd::Level;
 use gaurast_runner::Case;
 
-use super::exec::{Executable, LaneMask, Machine, Options, Watchdog};
+use super::Options;
 use super::ir::Program;
+use super::machine::{Executable, LaneMask, Machine, Watchdog};
 use super::resources::Resources;
 use crate::level::SimdLevel;
 

@@ -5,9 +5,10 @@ use std::time::Duration;
 
 use fearless_simd::Level;
 
+use crate::Options;
 use crate::builder::Builder;
-use crate::exec::{Executable, LaneMask, Machine, Options, Watchdog};
 use crate::ir::{Address, Block, Format, Label, Program, Rate, Reg, Space, Type};
+use crate::machine::{Executable, LaneMask, Machine, Watchdog};
 use crate::op::Op;
 use crate::resources::Resources;
 

@@ -1,8 +1,9 @@
 //! Operations across lanes.
 
+use crate::Options;
 use crate::builder::Builder;
-use crate::exec::{Executable, LaneMask, Machine, Options, Watchdog};
 use crate::ir::{Axis, Program, Rate, Reg, SubgroupOp, Type};
+use crate::machine::{Executable, LaneMask, Machine, Watchdog};
 use crate::op::Op;
 use crate::resources::Resources;
 

@@ -6,9 +6,10 @@ use std::time::Duration;
 
 use fearless_simd::Level;
 
+use crate::Options;
 use crate::builder::Builder;
-use crate::exec::{Executable, LaneMask, Machine, Options, Stopped, Watchdog};
 use crate::ir::{Address, Format, Label, Rate, Reg, Space, Statement, Type};
+use crate::machine::{Executable, LaneMask, Machine, Stopped, Watchdog};
 use crate::op::Op;
 use crate::resources::Resources;
 

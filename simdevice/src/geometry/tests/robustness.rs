@@ -214,5 +214,5 @@ fn a_vertex_program_without_end_is_stopped() {
     let mut counters = crate::stats::counters::Counters::default();
     let mut front = FrontEnd::new(&draw, surface, device.runtime(), &mut counters);
     let stopped = front.next_segments(&mut counters).unwrap_err();
-    assert!(matches!(stopped, isa::exec::Stopped::TimedOut { .. }));
+    assert!(matches!(stopped, isa::machine::Stopped::TimedOut { .. }));
 }

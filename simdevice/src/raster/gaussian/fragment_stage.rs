@@ -21,7 +21,8 @@ use crate::runtime::Runtime;
 use crate::stats::counters::{Counter, Counters};
 use devmem::dispatch;
 use fearless_simd::{Level, Simd, f32x16, prelude::*};
-use isa::exec::{Chunk, LaneMask, Machine, Stopped, Watchdog};
+use isa::Vector;
+use isa::machine::{LaneMask, Machine, Stopped, Watchdog};
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
@@ -281,7 +282,7 @@ impl<'a> FragmentStageDraw<'a> {
             };
             // An input that is the same for all lanes has one chunk.
             if let Some(chunk) = machine.input_mut(slot).get_mut(number) {
-                *chunk = Chunk(value);
+                *chunk = Vector(value);
             }
         }
     }

@@ -38,7 +38,7 @@ use fearless_simd::{Level, Simd, f32x16, prelude::*};
 use fragment_stage::{FragmentStageDraw, Tools};
 use grid::{BLOCK_PIXELS, BLOCKS, PixelMask, count, lanes_within};
 use inputs::{DepthMode, FIND_MEAN, FIND_MEDIAN, NO_DEPTH, TEST_DEPTH};
-use isa::exec::Stopped;
+use isa::machine::Stopped;
 use samples::{SAMPLES, Samples};
 use std::sync::atomic::AtomicBool;
 

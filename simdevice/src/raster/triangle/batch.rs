@@ -8,11 +8,11 @@ use crate::limits::TILE_SIZE;
 use crate::program::fragment::{BATCH_LANES, Interface};
 use crate::program::interface::{FragmentInput, Interpolation, Sampling};
 use crate::raster::tile_buffer::QuadAddresses;
-use crate::simd::{bits_of, both, three};
+use crate::simd::{bits_of, both, spread, three};
 use crate::stats::optimizations::{Optimization, Optimizations};
-use fearless_simd::f32x4;
 use fearless_simd::{Simd, f32x16, prelude::*};
-use isa::exec::{Chunk, LaneMask, Machine};
+use isa::Vector;
+use isa::machine::{LaneMask, Machine};
 
 /// Lanes of the largest batch.
 pub const LANES: usize = BATCH_LANES[1];
@@ -495,7 +495,7 @@ impl Batch {
                 _ => {
                     for (chunk, lanes) in lanes.iter_mut().enumerate() {
                         let input = (kind, place);
-                        *lanes = Chunk(self.input(simd, input, chunk, interface, samples));
+                        *lanes = Vector(self.input(simd, input, chunk, interface, samples));
                     }
                 }
             }
@@ -511,14 +511,14 @@ impl Batch {
         place: usize,
         per_record: usize,
         [b1, b2]: &[[f32; LANES]; 2],
-        out: &mut [Chunk],
+        out: &mut [Vector],
     ) {
         let (b1, b2) = (b1.as_chunks::<16>().0, b2.as_chunks::<16>().0);
         for (chunk, ((out, b1), b2)) in out.iter_mut().zip(b1).zip(b2).enumerate() {
             let attribute = self.attribute(simd, chunk, place, per_record);
             let b1 = f32x16::simd_from(simd, *b1);
             let b2 = f32x16::simd_from(simd, *b2);
-            *out = Chunk(bits_of(varying(attribute, [b1, b2])).into());
+            *out = Vector(bits_of(varying(attribute, [b1, b2])).into());
         }
     }
 
@@ -694,12 +694,4 @@ pub fn divided<S: Simd>(
 ) -> [f32x16<S>; 2] {
     let inverse = f32x16::splat(simd, 1.0) / inverse_w;
     [b1 * w1 * inverse, b2 * w2 * inverse]
-}
-
-/// A value of each quad for its lanes.
-#[inline(always)]
-fn spread<S: Simd>(simd: S, [a, b, c, d]: [f32; 4]) -> f32x16<S> {
-    let low = f32x4::splat(simd, a).combine(f32x4::splat(simd, b));
-    let high = f32x4::splat(simd, c).combine(f32x4::splat(simd, d));
-    low.combine(high)
 }

@@ -22,7 +22,7 @@ use crate::stats::counters::{Counter, Counters};
 use crate::stats::optimizations::Optimization;
 use devmem::dispatch;
 use fearless_simd::{Simd, f32x16};
-use isa::exec::{Stopped, Watchdog};
+use isa::machine::{Stopped, Watchdog};
 use std::sync::atomic::AtomicBool;
 
 /// The memory that a worker needs besides.
@@ -569,7 +569,7 @@ impl Renderer<'_, '_> {
         let killed = if stage.interface.discards {
             machine.killed()
         } else {
-            isa::exec::LaneMask::none()
+            isa::machine::LaneMask::none()
         };
         let buffers = &mut *self.buffers;
         let passed = dispatch!(level, simd => {

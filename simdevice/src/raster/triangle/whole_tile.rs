@@ -9,7 +9,8 @@ use crate::program::interface::Interpolation;
 use crate::raster::tile::{AREA, BLOCKS, block_corner};
 use crate::simd::{bits_of, both, three};
 use fearless_simd::{Simd, f32x16, prelude::*};
-use isa::exec::{Chunk, LaneMask};
+use isa::Vector;
+use isa::machine::LaneMask;
 
 // A tile fills the largest batch.
 const _: () = assert!(AREA == LANES);
@@ -71,10 +72,10 @@ impl FullTile {
         interpolation: Interpolation,
         divides: bool,
         attribute: [f32; 3],
-        out: &mut [Chunk],
+        out: &mut [Vector],
     ) {
         let [b1, b2] = match interpolation {
-            Interpolation::Flat => return out.fill(Chunk([attribute[0].to_bits(); 16])),
+            Interpolation::Flat => return out.fill(Vector([attribute[0].to_bits(); 16])),
             Interpolation::Perspective if divides => &self.perspective,
             _ => &self.linear,
         };
@@ -83,7 +84,7 @@ impl FullTile {
         for (out, (b1, b2)) in out.iter_mut().zip(b1.iter().zip(b2)) {
             let b1 = f32x16::simd_from(simd, *b1);
             let b2 = f32x16::simd_from(simd, *b2);
-            *out = Chunk(bits_of(varying(attribute, [b1, b2])).into());
+            *out = Vector(bits_of(varying(attribute, [b1, b2])).into());
         }
     }
 }

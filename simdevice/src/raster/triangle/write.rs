@@ -9,7 +9,7 @@ use crate::raster::output::{Buffers, Sources, covered_by_alpha, lanes_of};
 use crate::raster::tile_buffer::QuadAddresses;
 use crate::simd::as_floats;
 use fearless_simd::{Simd, f32x16, prelude::*, u32x16};
-use isa::exec::{LaneMask, Machine};
+use isa::machine::{LaneMask, Machine};
 
 /// Tests depth and stencil of 16 samples; returns the lanes that pass.
 #[inline(always)]
@@ -204,7 +204,7 @@ fn remove<S: Simd>(
 ) {
     if let Some(masks) = interface
         .sample_mask
-        .and_then(|slot| machine.output_chunks(slot).get(chunk))
+        .and_then(|slot| machine.output_vectors(slot).get(chunk))
     {
         for (lane, mask) in masks.0.iter().enumerate() {
             for (sample, lanes) in samples.iter_mut().enumerate() {
@@ -216,7 +216,7 @@ fn remove<S: Simd>(
     }
     if draw.draw.state.alpha_to_coverage {
         let alpha = interface.colors.first().and_then(|[first, _]| first[3]);
-        if let Some(alpha) = alpha.and_then(|slot| machine.output_chunks(slot).get(chunk)) {
+        if let Some(alpha) = alpha.and_then(|slot| machine.output_vectors(slot).get(chunk)) {
             let covered = covered_by_alpha(simd, alpha, draw.samples.positions.len());
             for (lanes, covered) in samples.iter_mut().zip(covered) {
                 *lanes &= covered;
@@ -238,7 +238,7 @@ fn late_depth<S: Simd>(
 ) -> u32x16<S> {
     let written = interface
         .depth
-        .and_then(|slot| machine.output_chunks(slot).get(chunk));
+        .and_then(|slot| machine.output_vectors(slot).get(chunk));
     let depth = match written {
         Some(depth) => as_floats(simd, depth),
         None => {

@@ -29,7 +29,7 @@ fn coordinate(rng: &mut ChaCha8Rng) -> f32 {
     }
 }
 
-fn lanes(mut value: impl FnMut() -> u32) -> Lanes {
+fn lanes(mut value: impl FnMut() -> u32) -> LaneWords {
     std::array::from_fn(|_| value())
 }
 

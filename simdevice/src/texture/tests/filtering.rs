@@ -83,7 +83,7 @@ fn a_gather_begins_lower_left_and_goes_round() {
     // Between texels (1, 1), (2, 1), (1, 2) and (2, 2).
     let mut request = request(Dimension::D2, &[[0.5, 0.5, 0.0, 0.0]]);
     request.gather = Some(0);
-    let one = |answer: [Lanes; 4]| answer.map(|lanes| lanes[0]);
+    let one = |answer: [LaneWords; 4]| answer.map(|lanes| lanes[0]);
     assert_eq!(one(table.sample(0, 0, &request)), [21, 22, 12, 11]);
     request.gather = Some(1);
     assert_eq!(one(table.sample(0, 0, &request)), [101, 102, 102, 101]);

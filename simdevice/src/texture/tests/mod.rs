@@ -14,7 +14,7 @@ use crate::runtime::SimdLevel;
 use crate::state::CompareOp;
 use crate::{Allocation, Format, Image, ImageView};
 use isa::ir::{Dimension, ImageShape};
-use isa::resources::{ImageUnit, Lanes, LodRequest, SampleRequest, TexelRequest};
+use isa::resources::{ImageUnit, LaneWords, LodRequest, SampleRequest, TexelRequest};
 
 /// A shape that is neither arrayed nor multisampled.
 fn shape(dimension: Dimension) -> ImageShape {
@@ -89,7 +89,7 @@ fn request(dimension: Dimension, coordinates: &[[f32; 4]]) -> SampleRequest {
 }
 
 /// One lane of an answer as floats.
-fn floats(answer: &[Lanes; 4], lane: usize) -> [f32; 4] {
+fn floats(answer: &[LaneWords; 4], lane: usize) -> [f32; 4] {
     answer.map(|lanes| f32::from_bits(lanes[lane]))
 }
 

@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::packet::{Attachment, BufferRange, Rendering};
-use isa::exec::Stopped;
 use isa::ir::{Address, AtomicOp, Binding, Format as Element, Space};
+use isa::machine::Stopped;
 use std::time::Duration;
 
 fn single() -> Config {

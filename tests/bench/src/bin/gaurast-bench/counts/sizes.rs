@@ -228,8 +228,8 @@ mod tests {
             owned("simdevice::raster::gaussian::by_block")
         );
         assert_eq!(
-            of("<isa::exec::engine::Kernels<S> as isa::exec::engine::Engine>::run"),
-            owned("isa::exec::engine")
+            of("<isa::machine::engine::Kernels<S> as isa::machine::engine::Engine>::run"),
+            owned("isa::machine::engine")
         );
         assert_eq!(of("core::ptr::drop_in_place<isa::ir::Type>"), None);
         assert_eq!(
