@@ -308,9 +308,6 @@ mod tests {
             C::InputAttachmentArrayDynamicIndexing,
             C::PhysicalStorageBufferAddresses,
             C::InputAttachmentArrayNonUniformIndexing,
-            C::MultiView,
-            C::VariablePointersStorageBuffer,
-            C::VariablePointers,
             C::AtomicFloat32AddEXT,
             C::AtomicFloat32MinMaxEXT,
         ];
