@@ -307,9 +307,6 @@ mod tests {
             C::StorageInputOutput16,
             C::InputAttachmentArrayDynamicIndexing,
             C::InputAttachmentArrayNonUniformIndexing,
-            C::MultiView,
-            C::VariablePointersStorageBuffer,
-            C::VariablePointers,
             C::AtomicFloat32AddEXT,
             C::AtomicFloat32MinMaxEXT,
         ];

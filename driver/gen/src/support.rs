@@ -31,6 +31,7 @@ pub struct Core {
     /// The features that work, by their names in the registry.
     pub features: Vec<String>,
     /// The features that the version makes mandatory and that don't work, and why.
+    #[serde(default)]
     pub missing: BTreeMap<String, String>,
 }
 

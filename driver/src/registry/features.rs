@@ -350,6 +350,14 @@ pub(crate) struct Features {
     pub(crate) performance_counter_query_pools: bool,
     /// `performanceCounterMultipleQueryPools`.
     pub(crate) performance_counter_multiple_query_pools: bool,
+    /// `workgroupMemoryExplicitLayout`.
+    pub(crate) workgroup_memory_explicit_layout: bool,
+    /// `workgroupMemoryExplicitLayoutScalarBlockLayout`.
+    pub(crate) workgroup_memory_explicit_layout_scalar_block_layout: bool,
+    /// `workgroupMemoryExplicitLayout8BitAccess`.
+    pub(crate) workgroup_memory_explicit_layout8_bit_access: bool,
+    /// `workgroupMemoryExplicitLayout16BitAccess`.
+    pub(crate) workgroup_memory_explicit_layout16_bit_access: bool,
 }
 
 /// The features that this driver supports.
@@ -396,6 +404,8 @@ pub(crate) const SUPPORTED: Features = Features {
     uniform_and_storage_buffer16_bit_access: true,
     storage_push_constant16: true,
     multiview: true,
+    variable_pointers_storage_buffer: true,
+    variable_pointers: true,
     shader_draw_parameters: true,
     sampler_mirror_clamp_to_edge: true,
     draw_indirect_count: true,
@@ -452,6 +462,7 @@ pub(crate) const SUPPORTED: Features = Features {
     synchronization2: true,
     shader_zero_initialize_workgroup_memory: true,
     dynamic_rendering: true,
+    shader_integer_dot_product: true,
     maintenance4: true,
     format_a4r4g4b4: true,
     format_a4b4g4r4: true,
@@ -490,6 +501,10 @@ pub(crate) const SUPPORTED: Features = Features {
     gaussian_multisample: true,
     gaussian_approximation: true,
     performance_counter_query_pools: true,
+    workgroup_memory_explicit_layout: true,
+    workgroup_memory_explicit_layout_scalar_block_layout: true,
+    workgroup_memory_explicit_layout8_bit_access: true,
+    workgroup_memory_explicit_layout16_bit_access: true,
     ..Features::NONE
 };
 
@@ -666,10 +681,14 @@ impl Features {
         gaussian_approximation: false,
         performance_counter_query_pools: false,
         performance_counter_multiple_query_pools: false,
+        workgroup_memory_explicit_layout: false,
+        workgroup_memory_explicit_layout_scalar_block_layout: false,
+        workgroup_memory_explicit_layout8_bit_access: false,
+        workgroup_memory_explicit_layout16_bit_access: false,
     };
 
     /// The features by their names in Rust.
-    pub(crate) fn list(&self) -> [(&'static str, bool); 170] {
+    pub(crate) fn list(&self) -> [(&'static str, bool); 174] {
         [
             ("robust_buffer_access", self.robust_buffer_access),
             ("full_draw_index_uint32", self.full_draw_index_uint32),
@@ -1047,6 +1066,22 @@ impl Features {
             (
                 "performance_counter_multiple_query_pools",
                 self.performance_counter_multiple_query_pools,
+            ),
+            (
+                "workgroup_memory_explicit_layout",
+                self.workgroup_memory_explicit_layout,
+            ),
+            (
+                "workgroup_memory_explicit_layout_scalar_block_layout",
+                self.workgroup_memory_explicit_layout_scalar_block_layout,
+            ),
+            (
+                "workgroup_memory_explicit_layout8_bit_access",
+                self.workgroup_memory_explicit_layout8_bit_access,
+            ),
+            (
+                "workgroup_memory_explicit_layout16_bit_access",
+                self.workgroup_memory_explicit_layout16_bit_access,
             ),
         ]
     }
@@ -1582,6 +1617,18 @@ impl Features {
             out.performance_counter_multiple_query_pools =
                 self.performance_counter_multiple_query_pools.into();
         }
+        if let Some(out) =
+            structure.cast::<vk::PhysicalDeviceWorkgroupMemoryExplicitLayoutFeaturesKHR<'_>>()
+        {
+            out.workgroup_memory_explicit_layout = self.workgroup_memory_explicit_layout.into();
+            out.workgroup_memory_explicit_layout_scalar_block_layout = self
+                .workgroup_memory_explicit_layout_scalar_block_layout
+                .into();
+            out.workgroup_memory_explicit_layout8_bit_access =
+                self.workgroup_memory_explicit_layout8_bit_access.into();
+            out.workgroup_memory_explicit_layout16_bit_access =
+                self.workgroup_memory_explicit_layout16_bit_access.into();
+        }
     }
 
     /// Adds the features that a structure of a chain requests, if it holds any that are known here.
@@ -2033,6 +2080,18 @@ impl Features {
             self.performance_counter_multiple_query_pools |=
                 requested.performance_counter_multiple_query_pools != vk::FALSE;
         }
+        if let Some(requested) =
+            valid::cast::<vk::PhysicalDeviceWorkgroupMemoryExplicitLayoutFeaturesKHR<'_>>(structure)
+        {
+            self.workgroup_memory_explicit_layout |=
+                requested.workgroup_memory_explicit_layout != vk::FALSE;
+            self.workgroup_memory_explicit_layout_scalar_block_layout |=
+                requested.workgroup_memory_explicit_layout_scalar_block_layout != vk::FALSE;
+            self.workgroup_memory_explicit_layout8_bit_access |=
+                requested.workgroup_memory_explicit_layout8_bit_access != vk::FALSE;
+            self.workgroup_memory_explicit_layout16_bit_access |=
+                requested.workgroup_memory_explicit_layout16_bit_access != vk::FALSE;
+        }
     }
 }
 
@@ -2073,6 +2132,9 @@ pub(crate) fn extension_of(structure: vk::StructureType) -> Option<&'static CStr
         }
         vk::PhysicalDevicePerformanceQueryFeaturesKHR::STRUCTURE_TYPE => {
             Some(c"VK_KHR_performance_query")
+        }
+        vk::PhysicalDeviceWorkgroupMemoryExplicitLayoutFeaturesKHR::STRUCTURE_TYPE => {
+            Some(c"VK_KHR_workgroup_memory_explicit_layout")
         }
         _ => None,
     }

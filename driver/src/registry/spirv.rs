@@ -411,13 +411,17 @@ pub(crate) fn enables(capability: Capability) -> &'static [Enable] {
             Enable::Absent("attachment_fragment_shading_rate"),
         ],
         Capability::WorkgroupMemoryExplicitLayoutKHR => {
-            &[Enable::Absent("workgroup_memory_explicit_layout")]
+            &[Enable::Feature("workgroup_memory_explicit_layout", |f| {
+                f.workgroup_memory_explicit_layout
+            })]
         }
-        Capability::WorkgroupMemoryExplicitLayout8BitAccessKHR => &[Enable::Absent(
+        Capability::WorkgroupMemoryExplicitLayout8BitAccessKHR => &[Enable::Feature(
             "workgroup_memory_explicit_layout8_bit_access",
+            |f| f.workgroup_memory_explicit_layout8_bit_access,
         )],
-        Capability::WorkgroupMemoryExplicitLayout16BitAccessKHR => &[Enable::Absent(
+        Capability::WorkgroupMemoryExplicitLayout16BitAccessKHR => &[Enable::Feature(
             "workgroup_memory_explicit_layout16_bit_access",
+            |f| f.workgroup_memory_explicit_layout16_bit_access,
         )],
         Capability::DotProductInputAll => &[Enable::Feature("shader_integer_dot_product", |f| {
             f.shader_integer_dot_product
