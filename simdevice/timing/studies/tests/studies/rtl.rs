@@ -118,10 +118,13 @@ fn the_module_draws_generated_tiles_as_the_model_does(case: &Case) {
 fn the_module_draws_real_tiles_as_the_model_does(case: &Case) {
     let format = format(case);
     let bench = module_bench(format);
-    let count = if is_long() { 350 } else { 4 };
+    let (count, size) = match is_long() {
+        true => (350, [1280, 720]),
+        false => (4, [640, 360]),
+    };
     let mut contributions = 0;
     for path in ["splats/playbot-125k.ply", "splats/skull.ply"] {
-        let view = View::open(&data(path), [640, 360]);
+        let view = View::open(&data(path), size);
         let module = Module::new(format, Exponential::Table, Groups::Rows);
         let lists = view.lists(format, None, count, 5);
         assert_eq!(lists.len(), count);

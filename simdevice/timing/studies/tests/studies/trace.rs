@@ -23,7 +23,9 @@ fn names(value: &Value, found: &mut BTreeSet<String>) {
 fn every_field_of_a_trace_is_documented() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../docs/simulator.md");
     let text = std::fs::read_to_string(path).expect("the document");
-    let (_, chapter) = text.split_once("\n## Traces\n").expect("a chapter of traces");
+    let (_, chapter) = text
+        .split_once("\n## Traces\n")
+        .expect("a chapter of traces");
     let (chapter, _) = chapter.split_once("\n## ").expect("a chapter after it");
     let tile = TileWork {
         runs: vec![Run::default()],
