@@ -133,7 +133,8 @@ fn what_is_not_there_is_refused() {
         "{text}"
     );
 
-    let mut chained = vk::PhysicalDeviceVulkan13Features::default().inline_uniform_block(true);
+    let mut chained =
+        vk::PhysicalDeviceVulkan13Features::default().texture_compression_astc_hdr(true);
     let (error, _) = refusal(
         &[gaussian_primitive_topology::NAME],
         &mut vk::PhysicalDeviceFeatures2::default().push_next(&mut chained),
