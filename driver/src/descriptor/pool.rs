@@ -149,26 +149,19 @@ fn remove(counts: &mut HashMap<vk::DescriptorType, u64>, layout: &DescriptorSetL
     }
 }
 
-/// # Safety
-/// The create info is valid.
 #[doc(alias = "vkCreateDescriptorPool")]
-pub(crate) unsafe fn create_descriptor_pool(
-    create_info: &vk::DescriptorPoolCreateInfo<'_>,
+pub(crate) fn create_descriptor_pool(
+    flags: vk::DescriptorPoolCreateFlags,
+    max_sets: u32,
+    pool_sizes: &[vk::DescriptorPoolSize],
 ) -> Result<Arc<DescriptorPool>, Error> {
-    let info = create_info;
-    let update_after_bind = vk::DescriptorPoolCreateFlags::UPDATE_AFTER_BIND;
-    if info.flags.contains(update_after_bind) {
+    if flags.contains(vk::DescriptorPoolCreateFlags::UPDATE_AFTER_BIND) {
         return Err(Error::FeatureNotPresent(
             "a descriptor pool for update after bind".into(),
         ));
     }
-    // SAFETY: the caller's promise.
-    let sizes = unsafe { valid::slice(info.p_pool_sizes, info.pool_size_count)? };
-    Ok(Arc::new(DescriptorPool::new(
-        info.max_sets,
-        sizes,
-        info.flags,
-    )))
+    let pool = DescriptorPool::new(max_sets, pool_sizes, flags);
+    Ok(Arc::new(pool))
 }
 
 /// # Safety

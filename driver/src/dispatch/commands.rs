@@ -787,11 +787,13 @@ unsafe extern "system" fn vkAllocateMemory(
     guard(device, "vkAllocateMemory", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
+            let info = valid::input(p_allocate_info)?;
             valid::output(
                 p_memory,
                 handle::create(crate::resource::memory::allocate_memory(
                     handle::get(device)?,
                     valid::input(p_allocate_info)?,
+                    valid::find_in_chain::<vk::ExportMemoryAllocateInfo<'_>>(info.p_next),
                 )?),
             )
             .map(|()| vk::Result::SUCCESS)
@@ -1098,11 +1100,13 @@ unsafe extern "system" fn vkCreateSemaphore(
     guard(device, "vkCreateSemaphore", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
+            let info = valid::input(p_create_info)?;
             valid::output(
                 p_semaphore,
                 handle::create(crate::sync::create_semaphore(
                     handle::get(device)?,
-                    valid::input(p_create_info)?,
+                    valid::find_in_chain::<vk::ExportSemaphoreCreateInfo<'_>>(info.p_next),
+                    valid::find_in_chain::<vk::SemaphoreTypeCreateInfo<'_>>(info.p_next),
                 )?),
             )
             .map(|()| vk::Result::SUCCESS)
@@ -1187,11 +1191,13 @@ unsafe extern "system" fn vkCreateBuffer(
     guard(device, "vkCreateBuffer", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
+            let info = valid::input(p_create_info)?;
             valid::output(
                 p_buffer,
-                handle::create(crate::resource::buffer::create_buffer(valid::input(
-                    p_create_info,
-                )?)?),
+                handle::create(crate::resource::buffer::create_buffer(
+                    valid::input(p_create_info)?,
+                    valid::find_in_chain::<vk::ExternalMemoryBufferCreateInfo<'_>>(info.p_next),
+                )?),
             )
             .map(|()| vk::Result::SUCCESS)
         }
@@ -1218,11 +1224,13 @@ unsafe extern "system" fn vkCreateImage(
     guard(device, "vkCreateImage", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
+            let info = valid::input(p_create_info)?;
             valid::output(
                 p_image,
-                handle::create(crate::resource::image::create_image(valid::input(
-                    p_create_info,
-                )?)?),
+                handle::create(crate::resource::image::create_image(
+                    valid::input(p_create_info)?,
+                    valid::find_in_chain::<vk::ExternalMemoryImageCreateInfo<'_>>(info.p_next),
+                )?),
             )
             .map(|()| vk::Result::SUCCESS)
         }
@@ -1269,11 +1277,13 @@ unsafe extern "system" fn vkCreateImageView(
     guard(device, "vkCreateImageView", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
+            let info = valid::input(p_create_info)?;
             valid::output(
                 p_view,
-                handle::create(crate::resource::image::create_image_view(valid::input(
-                    p_create_info,
-                )?)?),
+                handle::create(crate::resource::image::create_image_view(
+                    valid::input(p_create_info)?,
+                    handle::get(info.image)?,
+                )?),
             )
             .map(|()| vk::Result::SUCCESS)
         }
@@ -1345,8 +1355,10 @@ unsafe extern "system" fn vkAllocateCommandBuffers(
     guard(device, "vkAllocateCommandBuffers", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
+            let info = valid::input(p_allocate_info)?;
             crate::command::buffer::allocate_command_buffers(
-                valid::input(p_allocate_info)?,
+                handle::get(info.command_pool)?,
+                info.level,
                 valid::output_slice(
                     p_command_buffers,
                     valid::input(p_allocate_info)?.command_buffer_count as usize,
@@ -1442,7 +1454,12 @@ unsafe extern "system" fn vkCmdCopyBuffer(
                     p_regions: regions.as_ptr(),
                     ..Default::default()
                 };
-                crate::command::transfer::cmd_copy_buffer2(recorder, &info)
+                crate::command::transfer::cmd_copy_buffer2(
+                    recorder,
+                    handle::get(info.src_buffer)?,
+                    handle::get(info.dst_buffer)?,
+                    valid::slice(info.p_regions, info.region_count)?,
+                )
             })
         }
     })
@@ -1483,7 +1500,12 @@ unsafe extern "system" fn vkCmdCopyImage(
                     p_regions: regions.as_ptr(),
                     ..Default::default()
                 };
-                crate::command::transfer::cmd_copy_image2(recorder, &info)
+                crate::command::transfer::cmd_copy_image2(
+                    recorder,
+                    handle::get(info.src_image)?,
+                    handle::get(info.dst_image)?,
+                    valid::slice(info.p_regions, info.region_count)?,
+                )
             })
         }
     })
@@ -1523,7 +1545,12 @@ unsafe extern "system" fn vkCmdCopyBufferToImage(
                     p_regions: regions.as_ptr(),
                     ..Default::default()
                 };
-                crate::command::transfer::cmd_copy_buffer_to_image2(recorder, &info)
+                crate::command::transfer::cmd_copy_buffer_to_image2(
+                    recorder,
+                    handle::get(info.src_buffer)?,
+                    handle::get(info.dst_image)?,
+                    valid::slice(info.p_regions, info.region_count)?,
+                )
             })
         }
     })
@@ -1563,7 +1590,12 @@ unsafe extern "system" fn vkCmdCopyImageToBuffer(
                     p_regions: regions.as_ptr(),
                     ..Default::default()
                 };
-                crate::command::transfer::cmd_copy_image_to_buffer2(recorder, &info)
+                crate::command::transfer::cmd_copy_image_to_buffer2(
+                    recorder,
+                    handle::get(info.src_image)?,
+                    handle::get(info.dst_buffer)?,
+                    valid::slice(info.p_regions, info.region_count)?,
+                )
             })
         }
     })
@@ -1816,11 +1848,13 @@ unsafe extern "system" fn vkCreateBufferView(
     guard(device, "vkCreateBufferView", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
+            let info = valid::input(p_create_info)?;
             valid::output(
                 p_view,
-                handle::create(crate::resource::buffer::create_buffer_view(valid::input(
-                    p_create_info,
-                )?)?),
+                handle::create(crate::resource::buffer::create_buffer_view(
+                    valid::input(p_create_info)?,
+                    handle::get(info.buffer)?,
+                )?),
             )
             .map(|()| vk::Result::SUCCESS)
         }
@@ -1965,10 +1999,15 @@ unsafe extern "system" fn vkCreatePipelineLayout(
     guard(device, "vkCreatePipelineLayout", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
+            let info = valid::input(p_create_info)?;
             valid::output(
                 p_pipeline_layout,
                 handle::create(crate::pipeline::layout::create_pipeline_layout(
-                    valid::input(p_create_info)?,
+                    &handle::get_all_optional(valid::slice(
+                        info.p_set_layouts,
+                        info.set_layout_count,
+                    )?)?,
+                    valid::slice(info.p_push_constant_ranges, info.push_constant_range_count)?,
                 )?),
             )
             .map(|()| vk::Result::SUCCESS)
@@ -2058,10 +2097,13 @@ unsafe extern "system" fn vkCreateDescriptorPool(
     guard(device, "vkCreateDescriptorPool", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
+            let info = valid::input(p_create_info)?;
             valid::output(
                 p_descriptor_pool,
                 handle::create(crate::descriptor::pool::create_descriptor_pool(
-                    valid::input(p_create_info)?,
+                    info.flags,
+                    info.max_sets,
+                    valid::slice(info.p_pool_sizes, info.pool_size_count)?,
                 )?),
             )
             .map(|()| vk::Result::SUCCESS)
@@ -2398,11 +2440,13 @@ unsafe extern "system" fn vkCreateRenderPass(
     guard(device, "vkCreateRenderPass", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
+            let info = valid::input(p_create_info)?;
             valid::output(
                 p_render_pass,
-                handle::create(crate::render_pass::create_render_pass(valid::input(
-                    p_create_info,
-                )?)?),
+                handle::create(crate::render_pass::create_render_pass(
+                    valid::input(p_create_info)?,
+                    valid::find_in_chain::<vk::RenderPassMultiviewCreateInfo<'_>>(info.p_next),
+                )?),
             )
             .map(|()| vk::Result::SUCCESS)
         }
@@ -2773,7 +2817,13 @@ unsafe extern "system" fn vkCmdBlitImage(
                     filter,
                     ..Default::default()
                 };
-                crate::command::transfer::cmd_blit_image2(recorder, &info)
+                crate::command::transfer::cmd_blit_image2(
+                    recorder,
+                    handle::get(info.src_image)?,
+                    handle::get(info.dst_image)?,
+                    valid::slice(info.p_regions, info.region_count)?,
+                    info.filter,
+                )
             })
         }
     })
@@ -2858,7 +2908,12 @@ unsafe extern "system" fn vkCmdResolveImage(
                     p_regions: regions.as_ptr(),
                     ..Default::default()
                 };
-                crate::command::transfer::cmd_resolve_image2(recorder, &info)
+                crate::command::transfer::cmd_resolve_image2(
+                    recorder,
+                    handle::get(info.src_image)?,
+                    handle::get(info.dst_image)?,
+                    valid::slice(info.p_regions, info.region_count)?,
+                )
             })
         }
     })
@@ -3007,8 +3062,9 @@ unsafe extern "system" fn vkGetImageMemoryRequirements2(
     guard(device, "vkGetImageMemoryRequirements2", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
+            let info = valid::input(p_info)?;
             crate::resource::image::get_image_memory_requirements2(
-                valid::input(p_info)?,
+                handle::get(info.image)?,
                 OutputChain::new(p_memory_requirements)?,
             )
         }
@@ -3023,8 +3079,9 @@ unsafe extern "system" fn vkGetBufferMemoryRequirements2(
     guard(device, "vkGetBufferMemoryRequirements2", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
+            let info = valid::input(p_info)?;
             crate::resource::buffer::get_buffer_memory_requirements2(
-                valid::input(p_info)?,
+                handle::get(info.buffer)?,
                 OutputChain::new(p_memory_requirements)?,
             )
         }
@@ -3413,7 +3470,14 @@ unsafe extern "system" fn vkWaitSemaphores(
     guard(device, "vkWaitSemaphores", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            crate::sync::wait_semaphores(handle::get(device)?, valid::input(p_wait_info)?, timeout)
+            let info = valid::input(p_wait_info)?;
+            crate::sync::wait_semaphores(
+                handle::get(device)?,
+                info.flags,
+                &handle::get_all(valid::slice(info.p_semaphores, info.semaphore_count)?)?,
+                valid::slice(info.p_values, info.semaphore_count)?,
+                timeout,
+            )
         }
     })
 }
@@ -3425,7 +3489,8 @@ unsafe extern "system" fn vkSignalSemaphore(
     guard(device, "vkSignalSemaphore", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            crate::sync::signal_semaphore(valid::input(p_signal_info)?)
+            let info = valid::input(p_signal_info)?;
+            crate::sync::signal_semaphore(handle::get(info.semaphore)?, info.value)
                 .map(|()| vk::Result::SUCCESS)
         }
     })
@@ -3738,9 +3803,12 @@ unsafe extern "system" fn vkCmdCopyBuffer2(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdCopyBuffer2", |recorder| {
+                let info = valid::input(p_copy_buffer_info)?;
                 crate::command::transfer::cmd_copy_buffer2(
                     recorder,
-                    valid::input(p_copy_buffer_info)?,
+                    handle::get(info.src_buffer)?,
+                    handle::get(info.dst_buffer)?,
+                    valid::slice(info.p_regions, info.region_count)?,
                 )
             })
         }
@@ -3755,9 +3823,12 @@ unsafe extern "system" fn vkCmdCopyImage2(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdCopyImage2", |recorder| {
+                let info = valid::input(p_copy_image_info)?;
                 crate::command::transfer::cmd_copy_image2(
                     recorder,
-                    valid::input(p_copy_image_info)?,
+                    handle::get(info.src_image)?,
+                    handle::get(info.dst_image)?,
+                    valid::slice(info.p_regions, info.region_count)?,
                 )
             })
         }
@@ -3772,9 +3843,12 @@ unsafe extern "system" fn vkCmdCopyBufferToImage2(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdCopyBufferToImage2", |recorder| {
+                let info = valid::input(p_copy_buffer_to_image_info)?;
                 crate::command::transfer::cmd_copy_buffer_to_image2(
                     recorder,
-                    valid::input(p_copy_buffer_to_image_info)?,
+                    handle::get(info.src_buffer)?,
+                    handle::get(info.dst_image)?,
+                    valid::slice(info.p_regions, info.region_count)?,
                 )
             })
         }
@@ -3789,9 +3863,12 @@ unsafe extern "system" fn vkCmdCopyImageToBuffer2(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdCopyImageToBuffer2", |recorder| {
+                let info = valid::input(p_copy_image_to_buffer_info)?;
                 crate::command::transfer::cmd_copy_image_to_buffer2(
                     recorder,
-                    valid::input(p_copy_image_to_buffer_info)?,
+                    handle::get(info.src_image)?,
+                    handle::get(info.dst_buffer)?,
+                    valid::slice(info.p_regions, info.region_count)?,
                 )
             })
         }
@@ -3806,8 +3883,9 @@ unsafe extern "system" fn vkGetDeviceBufferMemoryRequirements(
     guard(device, "vkGetDeviceBufferMemoryRequirements", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
+            let info = valid::input(p_info)?;
             crate::resource::buffer::get_device_buffer_memory_requirements(
-                valid::input(p_info)?,
+                valid::input(info.p_create_info)?,
                 OutputChain::new(p_memory_requirements)?,
             )
         }
@@ -3822,8 +3900,9 @@ unsafe extern "system" fn vkGetDeviceImageMemoryRequirements(
     guard(device, "vkGetDeviceImageMemoryRequirements", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
+            let info = valid::input(p_info)?;
             crate::resource::image::get_device_image_memory_requirements(
-                valid::input(p_info)?,
+                valid::input(info.p_create_info)?,
                 OutputChain::new(p_memory_requirements)?,
             )
         }
@@ -3904,9 +3983,13 @@ unsafe extern "system" fn vkCmdBlitImage2(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdBlitImage2", |recorder| {
+                let info = valid::input(p_blit_image_info)?;
                 crate::command::transfer::cmd_blit_image2(
                     recorder,
-                    valid::input(p_blit_image_info)?,
+                    handle::get(info.src_image)?,
+                    handle::get(info.dst_image)?,
+                    valid::slice(info.p_regions, info.region_count)?,
+                    info.filter,
                 )
             })
         }
@@ -3921,9 +4004,12 @@ unsafe extern "system" fn vkCmdResolveImage2(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdResolveImage2", |recorder| {
+                let info = valid::input(p_resolve_image_info)?;
                 crate::command::transfer::cmd_resolve_image2(
                     recorder,
-                    valid::input(p_resolve_image_info)?,
+                    handle::get(info.src_image)?,
+                    handle::get(info.dst_image)?,
+                    valid::slice(info.p_regions, info.region_count)?,
                 )
             })
         }
@@ -4444,9 +4530,14 @@ unsafe extern "system" fn vkMapMemory2KHR(
     guard(device, "vkMapMemory2KHR", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
+            let info = valid::input(p_memory_map_info)?;
             valid::output(
                 pp_data,
-                crate::resource::memory::map_memory2(valid::input(p_memory_map_info)?)?,
+                crate::resource::memory::map_memory(
+                    handle::get(info.memory)?,
+                    info.offset,
+                    info.size,
+                )?,
             )
             .map(|()| vk::Result::SUCCESS)
         }
@@ -4460,7 +4551,8 @@ unsafe extern "system" fn vkUnmapMemory2KHR(
     guard(device, "vkUnmapMemory2KHR", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            crate::resource::memory::unmap_memory2(valid::input(p_memory_unmap_info)?)
+            let info = valid::input(p_memory_unmap_info)?;
+            crate::resource::memory::unmap_memory(handle::get(info.memory)?)
                 .map(|()| vk::Result::SUCCESS)
         }
     })

@@ -3,7 +3,7 @@
 use super::memory::Memory;
 use crate::abi::error::Error;
 use crate::abi::handle::{self, objects};
-use crate::abi::valid::{self, OutputChain};
+use crate::abi::valid::OutputChain;
 use crate::physical_device::formats;
 use crate::physical_device::limits::MIN_BUFFER_OFFSET_ALIGNMENT;
 use crate::physical_device::memory::ALL_TYPE_BITS;
@@ -159,13 +159,10 @@ pub(crate) fn fits(
 }
 
 /// The buffer that a create info asks for.
-///
-/// # Safety
-/// The create info's chain is valid.
-unsafe fn new_buffer(info: &vk::BufferCreateInfo<'_>) -> Result<Buffer, Error> {
-    // SAFETY: the caller's promise.
-    let external =
-        unsafe { valid::find_in_chain::<vk::ExternalMemoryBufferCreateInfo>(info.p_next) };
+fn new_buffer(
+    info: &vk::BufferCreateInfo<'_>,
+    external: Option<&vk::ExternalMemoryBufferCreateInfo<'_>>,
+) -> Result<Buffer, Error> {
     if external.is_some_and(|external| !external.handle_types.is_empty()) {
         return Err(Error::FeatureNotPresent("external memory".into()));
     }
@@ -203,14 +200,12 @@ pub(crate) fn fill_requirements(
     Ok(())
 }
 
-/// # Safety
-/// The create info's chain is valid.
 #[doc(alias = "vkCreateBuffer")]
-pub(crate) unsafe fn create_buffer(
+pub(crate) fn create_buffer(
     create_info: &vk::BufferCreateInfo<'_>,
+    external: Option<&vk::ExternalMemoryBufferCreateInfo<'_>>,
 ) -> Result<Arc<Buffer>, Error> {
-    // SAFETY: the caller's promise.
-    unsafe { new_buffer(create_info) }.map(Arc::new)
+    new_buffer(create_info, external).map(Arc::new)
 }
 
 #[doc(alias = "vkGetBufferMemoryRequirements")]
@@ -220,27 +215,20 @@ pub(crate) fn get_buffer_memory_requirements(
     Ok(buffer.requirements())
 }
 
-/// # Safety
-/// The buffer is live.
 #[doc(alias = "vkGetBufferMemoryRequirements2")]
-pub(crate) unsafe fn get_buffer_memory_requirements2(
-    info: &vk::BufferMemoryRequirementsInfo2<'_>,
+pub(crate) fn get_buffer_memory_requirements2(
+    buffer: &Buffer,
     memory_requirements: OutputChain<'_, vk::MemoryRequirements2<'_>>,
 ) -> Result<(), Error> {
-    // SAFETY: the caller's promise.
-    let buffer = unsafe { handle::get(info.buffer)? };
     fill_requirements(memory_requirements, buffer.requirements())
 }
 
-/// # Safety
-/// The info's create info is valid.
 #[doc(alias = "vkGetDeviceBufferMemoryRequirements")]
-pub(crate) unsafe fn get_device_buffer_memory_requirements(
-    info: &vk::DeviceBufferMemoryRequirements<'_>,
+pub(crate) fn get_device_buffer_memory_requirements(
+    create_info: &vk::BufferCreateInfo<'_>,
     memory_requirements: OutputChain<'_, vk::MemoryRequirements2<'_>>,
 ) -> Result<(), Error> {
-    // SAFETY: the caller's promise.
-    let buffer = unsafe { new_buffer(valid::input(info.p_create_info)?)? };
+    let buffer = new_buffer(create_info, None)?;
     fill_requirements(memory_requirements, buffer.requirements())
 }
 
@@ -266,11 +254,10 @@ pub(crate) unsafe fn bind_buffer_memory2(
     })
 }
 
-/// # Safety
-/// The buffer is live.
 #[doc(alias = "vkCreateBufferView")]
-pub(crate) unsafe fn create_buffer_view(
+pub(crate) fn create_buffer_view(
     create_info: &vk::BufferViewCreateInfo<'_>,
+    buffer: &Buffer,
 ) -> Result<Arc<BufferView>, Error> {
     let info = create_info;
     let size = (info.range != vk::WHOLE_SIZE).then_some(info.range);
@@ -289,8 +276,6 @@ pub(crate) unsafe fn create_buffer_view(
             ),
         ));
     }
-    // SAFETY: the caller's promise.
-    let buffer = unsafe { handle::get(info.buffer)? };
     Ok(Arc::new(BufferView {
         range: buffer.range(info.offset, size, &VIEWED)?,
         format,
