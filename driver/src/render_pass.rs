@@ -197,68 +197,51 @@ pub(crate) fn layers(view_mask: u32, layers: u32) -> u32 {
     }
 }
 
-/// A subpass of `vkCreateRenderPass`.
-///
-/// # Safety
-/// The description's pointers are valid.
-unsafe fn new_subpass(subpass: &vk::SubpassDescription<'_>) -> Result<Subpass, Error> {
-    // SAFETY: the caller's promise.
-    let (color, resolve, input, depth_stencil) = unsafe {
-        let count = subpass.color_attachment_count;
-        let has_resolve = !subpass.p_resolve_attachments.is_null();
+/// The subpass of a description of either version, without a resolve of depth and stencil. The description's pointers are
+/// valid.
+macro_rules! subpass {
+    ($description:expr) => {{
+        let description = $description;
+        let count = description.color_attachment_count;
+        let has_resolve = !description.p_resolve_attachments.is_null();
         let resolve_count = if has_resolve { count } else { 0 };
-        (
-            valid::slice(subpass.p_color_attachments, count)?,
-            valid::slice(subpass.p_resolve_attachments, resolve_count)?,
-            valid::slice(subpass.p_input_attachments, subpass.input_attachment_count)?,
-            valid::optional(subpass.p_depth_stencil_attachment),
-        )
-    };
-    let all = |references: &[vk::AttachmentReference]| {
-        references.iter().map(|r| used(r.attachment)).collect()
-    };
-    Ok(Subpass {
-        color: all(color),
-        resolve: all(resolve),
-        depth_stencil: depth_stencil.and_then(|r| used(r.attachment)),
-        depth_stencil_resolve: None,
-        input: all(input),
-        view_mask: 0,
-    })
+        let color = valid::slice(description.p_color_attachments, count)?;
+        let resolve = valid::slice(description.p_resolve_attachments, resolve_count)?;
+        let input = valid::slice(
+            description.p_input_attachments,
+            description.input_attachment_count,
+        )?;
+        let depth_stencil = valid::optional(description.p_depth_stencil_attachment);
+        Subpass {
+            color: color.iter().map(|r| used(r.attachment)).collect(),
+            resolve: resolve.iter().map(|r| used(r.attachment)).collect(),
+            depth_stencil: depth_stencil.and_then(|r| used(r.attachment)),
+            depth_stencil_resolve: None,
+            input: input.iter().map(|r| used(r.attachment)).collect(),
+            view_mask: 0,
+        }
+    }};
 }
 
-/// A subpass of `vkCreateRenderPass2`.
-///
-/// # Safety
-/// The description's pointers and chain are valid.
-unsafe fn new_subpass2(subpass: &vk::SubpassDescription2<'_>) -> Result<Subpass, Error> {
-    // SAFETY: the caller's promise.
-    let (color, resolve, input, depth_stencil, depth_stencil_resolve) = unsafe {
-        let count = subpass.color_attachment_count;
-        let has_resolve = !subpass.p_resolve_attachments.is_null();
-        let resolve_count = if has_resolve { count } else { 0 };
-        (
-            valid::slice(subpass.p_color_attachments, count)?,
-            valid::slice(subpass.p_resolve_attachments, resolve_count)?,
-            valid::slice(subpass.p_input_attachments, subpass.input_attachment_count)?,
-            valid::optional(subpass.p_depth_stencil_attachment),
-            match valid::find_in_chain(subpass.p_next) {
-                Some(info) => new_depth_stencil_resolve(info)?,
-                None => None,
-            },
-        )
-    };
-    let all = |references: &[vk::AttachmentReference2<'_>]| {
-        references.iter().map(|r| used(r.attachment)).collect()
-    };
-    Ok(Subpass {
-        color: all(color),
-        resolve: all(resolve),
-        depth_stencil: depth_stencil.and_then(|r| used(r.attachment)),
-        depth_stencil_resolve,
-        input: all(input),
-        view_mask: subpass.view_mask,
-    })
+/// The render pass of a create info of either version, of whose descriptions `subpass` makes subpasses. The info's pointers
+/// are valid.
+macro_rules! render_pass {
+    ($info:expr, $subpass:expr) => {{
+        let info = $info;
+        let attachments = valid::slice(info.p_attachments, info.attachment_count)?;
+        let attachments = attachments.iter().map(|attachment| AttachmentDescription {
+            format: attachment.format,
+            load: attachment.load_op,
+            store: attachment.store_op,
+            stencil_load: attachment.stencil_load_op,
+            stencil_store: attachment.stencil_store_op,
+        });
+        let mut subpasses = simdevice::host::with_capacity(info.subpass_count as usize);
+        for description in valid::slice(info.p_subpasses, info.subpass_count)? {
+            subpasses.push($subpass(description)?);
+        }
+        RenderPass::new(attachments.collect(), subpasses).map(Arc::new)
+    }};
 }
 
 /// The resolve of a subpass's depth and stencil, if it has one.
@@ -285,34 +268,22 @@ unsafe fn new_depth_stencil_resolve(
 #[doc(alias = "vkCreateRenderPass")]
 pub(crate) unsafe fn create_render_pass(
     create_info: &vk::RenderPassCreateInfo<'_>,
+    multiview: Option<&vk::RenderPassMultiviewCreateInfo<'_>>,
 ) -> Result<Arc<RenderPass>, Error> {
-    let info = create_info;
     // SAFETY: the caller's promise.
     unsafe {
-        let multiview = valid::find_in_chain::<vk::RenderPassMultiviewCreateInfo>(info.p_next);
         let masks = match multiview {
             Some(multiview) => valid::slice(multiview.p_view_masks, multiview.subpass_count)?,
             None => &[],
         };
-        let attachments = valid::slice(info.p_attachments, info.attachment_count)?;
-        let mut subpasses = simdevice::host::with_capacity(info.subpass_count as usize);
-        for (index, subpass) in valid::slice(info.p_subpasses, info.subpass_count)?
-            .iter()
-            .enumerate()
-        {
-            subpasses.push(Subpass {
-                view_mask: masks.get(index).copied().unwrap_or(0),
-                ..new_subpass(subpass)?
-            });
-        }
-        let attachments = attachments.iter().map(|attachment| AttachmentDescription {
-            format: attachment.format,
-            load: attachment.load_op,
-            store: attachment.store_op,
-            stencil_load: attachment.stencil_load_op,
-            stencil_store: attachment.stencil_store_op,
-        });
-        RenderPass::new(attachments.collect(), subpasses).map(Arc::new)
+        let mut masks = masks.iter();
+        let mut subpass = |description: &vk::SubpassDescription<'_>| {
+            Ok::<_, Error>(Subpass {
+                view_mask: masks.next().copied().unwrap_or(0),
+                ..subpass!(description)
+            })
+        };
+        render_pass!(create_info, subpass)
     }
 }
 
@@ -322,22 +293,20 @@ pub(crate) unsafe fn create_render_pass(
 pub(crate) unsafe fn create_render_pass2(
     create_info: &vk::RenderPassCreateInfo2<'_>,
 ) -> Result<Arc<RenderPass>, Error> {
-    let info = create_info;
     // SAFETY: the caller's promise.
     unsafe {
-        let attachments = valid::slice(info.p_attachments, info.attachment_count)?;
-        let mut subpasses = simdevice::host::with_capacity(info.subpass_count as usize);
-        for subpass in valid::slice(info.p_subpasses, info.subpass_count)? {
-            subpasses.push(new_subpass2(subpass)?);
-        }
-        let attachments = attachments.iter().map(|attachment| AttachmentDescription {
-            format: attachment.format,
-            load: attachment.load_op,
-            store: attachment.store_op,
-            stencil_load: attachment.stencil_load_op,
-            stencil_store: attachment.stencil_store_op,
-        });
-        RenderPass::new(attachments.collect(), subpasses).map(Arc::new)
+        let subpass = |description: &vk::SubpassDescription2<'_>| {
+            let resolve = match valid::find_in_chain(description.p_next) {
+                Some(info) => new_depth_stencil_resolve(info)?,
+                None => None,
+            };
+            Ok::<_, Error>(Subpass {
+                depth_stencil_resolve: resolve,
+                view_mask: description.view_mask,
+                ..subpass!(description)
+            })
+        };
+        render_pass!(create_info, subpass)
     }
 }
 

@@ -1,8 +1,7 @@
 //! Fences, semaphores and events.
 
 use crate::abi::error::Error;
-use crate::abi::handle::{self, objects};
-use crate::abi::valid;
+use crate::abi::handle::objects;
 use crate::device::Device;
 use crate::device_sync::{DeviceSync, WaitResult, deadline};
 use ash::vk;
@@ -205,21 +204,13 @@ pub(crate) fn wait_for_fences(
     wait_result(waited, || sync.check())
 }
 
-/// # Safety
-/// The create info's chain is valid.
 #[doc(alias = "vkCreateSemaphore")]
-pub(crate) unsafe fn create_semaphore(
+pub(crate) fn create_semaphore(
     device: &Device,
-    create_info: &vk::SemaphoreCreateInfo<'_>,
+    exports: Option<&vk::ExportSemaphoreCreateInfo<'_>>,
+    kind: Option<&vk::SemaphoreTypeCreateInfo<'_>>,
 ) -> Result<Arc<Semaphore>, Error> {
     let sync = Arc::clone(device.sync());
-    // SAFETY: the caller's promise.
-    let (exports, kind) = unsafe {
-        (
-            valid::find_in_chain::<vk::ExportSemaphoreCreateInfo>(create_info.p_next),
-            valid::find_in_chain::<vk::SemaphoreTypeCreateInfo>(create_info.p_next),
-        )
-    };
     if exports.is_some_and(|export| !export.handle_types.is_empty()) {
         return Err(Error::FeatureNotPresent("exporting semaphores".into()));
     }
@@ -240,26 +231,19 @@ pub(crate) fn get_semaphore_counter_value(
     timeline_value(semaphore)
 }
 
-/// # Safety
-/// The wait info and its handles are valid.
 #[doc(alias = "vkWaitSemaphores")]
-pub(crate) unsafe fn wait_semaphores(
+pub(crate) fn wait_semaphores(
     device: &Device,
-    wait_info: &vk::SemaphoreWaitInfo<'_>,
+    flags: vk::SemaphoreWaitFlags,
+    semaphores: &[Arc<Semaphore>],
+    values: &[u64],
     timeout: u64,
 ) -> Result<vk::Result, Error> {
-    let (sync, info) = (device.sync(), wait_info);
-    // SAFETY: the caller's promise.
-    let (semaphores, values) = unsafe {
-        (
-            handle::get_all(valid::slice(info.p_semaphores, info.semaphore_count)?)?,
-            valid::slice(info.p_values, info.semaphore_count)?,
-        )
-    };
-    for semaphore in &semaphores {
+    let sync = device.sync();
+    for semaphore in semaphores {
         timeline_value(semaphore)?;
     }
-    let any = info.flags.contains(vk::SemaphoreWaitFlags::ANY);
+    let any = flags.contains(vk::SemaphoreWaitFlags::ANY);
     let waited = sync.wait(deadline(timeout), || {
         let mut reached = semaphores
             .iter()
@@ -274,16 +258,10 @@ pub(crate) unsafe fn wait_semaphores(
     wait_result(waited, || sync.check())
 }
 
-/// # Safety
-/// The semaphore is live.
 #[doc(alias = "vkSignalSemaphore")]
-pub(crate) unsafe fn signal_semaphore(
-    signal_info: &vk::SemaphoreSignalInfo<'_>,
-) -> Result<(), Error> {
-    // SAFETY: the caller's promise.
-    let semaphore = unsafe { handle::get(signal_info.semaphore)? };
+pub(crate) fn signal_semaphore(semaphore: &Semaphore, value: u64) -> Result<(), Error> {
     timeline_value(semaphore)?;
-    semaphore.signal(signal_info.value);
+    semaphore.signal(value);
     Ok(())
 }
 

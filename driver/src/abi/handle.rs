@@ -164,6 +164,23 @@ pub(crate) unsafe fn get_all<H: Handle>(handles: &[H]) -> Result<Vec<Arc<H::Obje
         .collect()
 }
 
+/// The objects of several handles, of which null ones have none.
+///
+/// # Errors
+/// [`Error::InvalidHandle`] if any is of another type.
+///
+/// # Safety
+/// As [`get`], for the time of the call.
+pub(crate) unsafe fn get_all_optional<H: Handle>(
+    handles: &[H],
+) -> Result<Vec<Option<Arc<H::Object>>>, Error> {
+    handles
+        .iter()
+        // SAFETY: the caller's promise is `get_optional`'s.
+        .map(|&handle| Ok(unsafe { get_optional(handle) }?.cloned()))
+        .collect()
+}
+
 /// Destroys a handle and returns what it owned; null is allowed and does nothing.
 ///
 /// # Errors

@@ -483,17 +483,14 @@ pub(crate) fn reset_command_pool(command_pool: &CommandPool) -> Result<(), Error
     command_pool.reset()
 }
 
-/// # Safety
-/// The allocate info's pool is live.
 #[doc(alias = "vkAllocateCommandBuffers")]
-pub(crate) unsafe fn allocate_command_buffers(
-    allocate_info: &vk::CommandBufferAllocateInfo<'_>,
+pub(crate) fn allocate_command_buffers(
+    command_pool: &CommandPool,
+    level: vk::CommandBufferLevel,
     command_buffers: &mut [MaybeUninit<vk::CommandBuffer>],
 ) -> Result<(), Error> {
-    // SAFETY: the caller's promise.
-    let pool = unsafe { handle::get(allocate_info.command_pool)? };
     for place in command_buffers {
-        place.write(pool.allocate(allocate_info.level));
+        place.write(command_pool.allocate(level));
     }
     Ok(())
 }

@@ -3,7 +3,6 @@
 
 use super::buffer::Recorder;
 use crate::abi::error::Error;
-use crate::abi::handle;
 use crate::abi::valid;
 use crate::convert;
 use crate::resource::buffer::{Buffer, BufferRules};
@@ -23,139 +22,80 @@ use std::sync::Arc;
 /// The most bytes that `vkCmdUpdateBuffer` takes.
 const MAX_UPDATE: u64 = 65_536;
 
-/// # Safety
-/// The info is valid, and its handles are live.
 #[doc(alias = "vkCmdCopyBuffer2")]
-pub(crate) unsafe fn cmd_copy_buffer2(
+pub(crate) fn cmd_copy_buffer2(
     recorder: &mut Recorder,
-    copy_buffer_info: &vk::CopyBufferInfo2<'_>,
+    src_buffer: &Buffer,
+    dst_buffer: &Buffer,
+    regions: &[vk::BufferCopy2<'_>],
 ) -> Result<(), Error> {
-    let info = copy_buffer_info;
-    // SAFETY: the caller's promise.
-    let (regions, source, target) = unsafe {
-        (
-            valid::slice(info.p_regions, info.region_count)?,
-            handle::get(info.src_buffer)?,
-            handle::get(info.dst_buffer)?,
-        )
-    };
     recorder.require_outside_pass()?;
-    recorder.packet(copy_buffer(source, target, regions)?);
+    recorder.packet(copy_buffer(src_buffer, dst_buffer, regions)?);
     Ok(())
 }
 
-/// # Safety
-/// The info is valid, and its handles are live.
 #[doc(alias = "vkCmdCopyImage2")]
-pub(crate) unsafe fn cmd_copy_image2(
+pub(crate) fn cmd_copy_image2(
     recorder: &mut Recorder,
-    copy_image_info: &vk::CopyImageInfo2<'_>,
+    src_image: &Image,
+    dst_image: &Image,
+    regions: &[vk::ImageCopy2<'_>],
 ) -> Result<(), Error> {
-    let info = copy_image_info;
-    // SAFETY: the caller's promise.
-    let (regions, source, target) = unsafe {
-        (
-            valid::slice(info.p_regions, info.region_count)?,
-            handle::get(info.src_image)?,
-            handle::get(info.dst_image)?,
-        )
-    };
     recorder.require_outside_pass()?;
-    recorder.packet(copy_image(source, target, regions)?);
+    recorder.packet(copy_image(src_image, dst_image, regions)?);
     Ok(())
 }
 
-/// # Safety
-/// The info is valid, and its handles are live.
 #[doc(alias = "vkCmdBlitImage2")]
-pub(crate) unsafe fn cmd_blit_image2(
+pub(crate) fn cmd_blit_image2(
     recorder: &mut Recorder,
-    blit_image_info: &vk::BlitImageInfo2<'_>,
+    src_image: &Image,
+    dst_image: &Image,
+    regions: &[vk::ImageBlit2<'_>],
+    filter: vk::Filter,
 ) -> Result<(), Error> {
-    let info = blit_image_info;
-    // SAFETY: the caller's promise.
-    let (regions, source, target) = unsafe {
-        (
-            valid::slice(info.p_regions, info.region_count)?,
-            handle::get(info.src_image)?,
-            handle::get(info.dst_image)?,
-        )
-    };
     recorder.require_outside_pass()?;
-    recorder.packet(blit_image(source, target, info.filter, regions)?);
+    recorder.packet(blit_image(src_image, dst_image, filter, regions)?);
     Ok(())
 }
 
-/// # Safety
-/// The info is valid, and its handles are live.
 #[doc(alias = "vkCmdResolveImage2")]
-pub(crate) unsafe fn cmd_resolve_image2(
+pub(crate) fn cmd_resolve_image2(
     recorder: &mut Recorder,
-    resolve_image_info: &vk::ResolveImageInfo2<'_>,
+    src_image: &Image,
+    dst_image: &Image,
+    regions: &[vk::ImageResolve2<'_>],
 ) -> Result<(), Error> {
-    let info = resolve_image_info;
-    // SAFETY: the caller's promise.
-    let (regions, source, target) = unsafe {
-        (
-            valid::slice(info.p_regions, info.region_count)?,
-            handle::get(info.src_image)?,
-            handle::get(info.dst_image)?,
-        )
-    };
     recorder.require_outside_pass()?;
-    recorder.packet(resolve_image(source, target, regions)?);
+    recorder.packet(resolve_image(src_image, dst_image, regions)?);
     Ok(())
 }
 
-/// # Safety
-/// The info is valid, and its handles are live.
 #[doc(alias = "vkCmdCopyBufferToImage2")]
-pub(crate) unsafe fn cmd_copy_buffer_to_image2(
+pub(crate) fn cmd_copy_buffer_to_image2(
     recorder: &mut Recorder,
-    copy_buffer_to_image_info: &vk::CopyBufferToImageInfo2<'_>,
+    src_buffer: &Buffer,
+    dst_image: &Image,
+    regions: &[vk::BufferImageCopy2<'_>],
 ) -> Result<(), Error> {
-    let info = copy_buffer_to_image_info;
-    // SAFETY: the caller's promise.
-    let (regions, buffer, image) = unsafe {
-        (
-            valid::slice(info.p_regions, info.region_count)?,
-            handle::get(info.src_buffer)?,
-            handle::get(info.dst_image)?,
-        )
-    };
     recorder.require_outside_pass()?;
-    recorder.packet(Packet::CopyBufferToImage(copy_buffer_image(
-        buffer,
-        image,
-        regions,
-        (&COPY_TO_IMAGE_BUFFER, &COPY_TO_IMAGE),
-    )?));
+    let rules = (&COPY_TO_IMAGE_BUFFER, &COPY_TO_IMAGE);
+    let copy = copy_buffer_image(src_buffer, dst_image, regions, rules)?;
+    recorder.packet(Packet::CopyBufferToImage(copy));
     Ok(())
 }
 
-/// # Safety
-/// The info is valid, and its handles are live.
 #[doc(alias = "vkCmdCopyImageToBuffer2")]
-pub(crate) unsafe fn cmd_copy_image_to_buffer2(
+pub(crate) fn cmd_copy_image_to_buffer2(
     recorder: &mut Recorder,
-    copy_image_to_buffer_info: &vk::CopyImageToBufferInfo2<'_>,
+    src_image: &Image,
+    dst_buffer: &Buffer,
+    regions: &[vk::BufferImageCopy2<'_>],
 ) -> Result<(), Error> {
-    let info = copy_image_to_buffer_info;
-    // SAFETY: the caller's promise.
-    let (regions, image, buffer) = unsafe {
-        (
-            valid::slice(info.p_regions, info.region_count)?,
-            handle::get(info.src_image)?,
-            handle::get(info.dst_buffer)?,
-        )
-    };
     recorder.require_outside_pass()?;
-    recorder.packet(Packet::CopyImageToBuffer(copy_buffer_image(
-        buffer,
-        image,
-        regions,
-        (&COPY_FROM_IMAGE_BUFFER, &COPY_FROM_IMAGE),
-    )?));
+    let rules = (&COPY_FROM_IMAGE_BUFFER, &COPY_FROM_IMAGE);
+    let copy = copy_buffer_image(dst_buffer, src_image, regions, rules)?;
+    recorder.packet(Packet::CopyImageToBuffer(copy));
     Ok(())
 }
 

@@ -157,20 +157,13 @@ impl DescriptorPool {
     }
 }
 
-/// # Safety
-/// The create info is valid.
 #[doc(alias = "vkCreateDescriptorPool")]
-pub(crate) unsafe fn create_descriptor_pool(
-    create_info: &vk::DescriptorPoolCreateInfo<'_>,
+pub(crate) fn create_descriptor_pool(
+    flags: vk::DescriptorPoolCreateFlags,
+    max_sets: u32,
+    pool_sizes: &[vk::DescriptorPoolSize],
 ) -> Result<Arc<DescriptorPool>, Error> {
-    let info = create_info;
-    // SAFETY: the caller's promise.
-    let sizes = unsafe { valid::slice(info.p_pool_sizes, info.pool_size_count)? };
-    Ok(Arc::new(DescriptorPool::new(
-        info.max_sets,
-        sizes,
-        info.flags,
-    )))
+    Ok(Arc::new(DescriptorPool::new(max_sets, pool_sizes, flags)))
 }
 
 /// # Safety

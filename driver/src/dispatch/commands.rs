@@ -792,11 +792,13 @@ unsafe extern "system" fn vkAllocateMemory(
     guard(device, "vkAllocateMemory", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
+            let info = valid::input(p_allocate_info)?;
             valid::output(
                 p_memory,
                 handle::create(crate::resource::memory::allocate_memory(
                     handle::get(device)?,
                     valid::input(p_allocate_info)?,
+                    valid::find_in_chain::<vk::ExportMemoryAllocateInfo<'_>>(info.p_next),
                 )?),
             )
             .map(|()| vk::Result::SUCCESS)
@@ -1103,11 +1105,13 @@ unsafe extern "system" fn vkCreateSemaphore(
     guard(device, "vkCreateSemaphore", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
+            let info = valid::input(p_create_info)?;
             valid::output(
                 p_semaphore,
                 handle::create(crate::sync::create_semaphore(
                     handle::get(device)?,
-                    valid::input(p_create_info)?,
+                    valid::find_in_chain::<vk::ExportSemaphoreCreateInfo<'_>>(info.p_next),
+                    valid::find_in_chain::<vk::SemaphoreTypeCreateInfo<'_>>(info.p_next),
                 )?),
             )
             .map(|()| vk::Result::SUCCESS)
@@ -1192,11 +1196,13 @@ unsafe extern "system" fn vkCreateBuffer(
     guard(device, "vkCreateBuffer", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
+            let info = valid::input(p_create_info)?;
             valid::output(
                 p_buffer,
                 handle::create(crate::resource::buffer::create_buffer(
                     handle::get(device)?,
                     valid::input(p_create_info)?,
+                    valid::find_in_chain::<vk::ExternalMemoryBufferCreateInfo<'_>>(info.p_next),
                 )?),
             )
             .map(|()| vk::Result::SUCCESS)
@@ -1224,11 +1230,13 @@ unsafe extern "system" fn vkCreateImage(
     guard(device, "vkCreateImage", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
+            let info = valid::input(p_create_info)?;
             valid::output(
                 p_image,
-                handle::create(crate::resource::image::create_image(valid::input(
-                    p_create_info,
-                )?)?),
+                handle::create(crate::resource::image::create_image(
+                    valid::input(p_create_info)?,
+                    valid::find_in_chain::<vk::ExternalMemoryImageCreateInfo<'_>>(info.p_next),
+                )?),
             )
             .map(|()| vk::Result::SUCCESS)
         }
@@ -1275,11 +1283,13 @@ unsafe extern "system" fn vkCreateImageView(
     guard(device, "vkCreateImageView", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
+            let info = valid::input(p_create_info)?;
             valid::output(
                 p_view,
-                handle::create(crate::resource::image::create_image_view(valid::input(
-                    p_create_info,
-                )?)?),
+                handle::create(crate::resource::image::create_image_view(
+                    valid::input(p_create_info)?,
+                    handle::get(info.image)?,
+                )?),
             )
             .map(|()| vk::Result::SUCCESS)
         }
@@ -1351,8 +1361,10 @@ unsafe extern "system" fn vkAllocateCommandBuffers(
     guard(device, "vkAllocateCommandBuffers", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
+            let info = valid::input(p_allocate_info)?;
             crate::command::buffer::allocate_command_buffers(
-                valid::input(p_allocate_info)?,
+                handle::get(info.command_pool)?,
+                info.level,
                 valid::output_slice(
                     p_command_buffers,
                     valid::input(p_allocate_info)?.command_buffer_count as usize,
@@ -1448,7 +1460,12 @@ unsafe extern "system" fn vkCmdCopyBuffer(
                     p_regions: regions.as_ptr(),
                     ..Default::default()
                 };
-                crate::command::transfer::cmd_copy_buffer2(recorder, &info)
+                crate::command::transfer::cmd_copy_buffer2(
+                    recorder,
+                    handle::get(info.src_buffer)?,
+                    handle::get(info.dst_buffer)?,
+                    valid::slice(info.p_regions, info.region_count)?,
+                )
             })
         }
     })
@@ -1489,7 +1506,12 @@ unsafe extern "system" fn vkCmdCopyImage(
                     p_regions: regions.as_ptr(),
                     ..Default::default()
                 };
-                crate::command::transfer::cmd_copy_image2(recorder, &info)
+                crate::command::transfer::cmd_copy_image2(
+                    recorder,
+                    handle::get(info.src_image)?,
+                    handle::get(info.dst_image)?,
+                    valid::slice(info.p_regions, info.region_count)?,
+                )
             })
         }
     })
@@ -1529,7 +1551,12 @@ unsafe extern "system" fn vkCmdCopyBufferToImage(
                     p_regions: regions.as_ptr(),
                     ..Default::default()
                 };
-                crate::command::transfer::cmd_copy_buffer_to_image2(recorder, &info)
+                crate::command::transfer::cmd_copy_buffer_to_image2(
+                    recorder,
+                    handle::get(info.src_buffer)?,
+                    handle::get(info.dst_image)?,
+                    valid::slice(info.p_regions, info.region_count)?,
+                )
             })
         }
     })
@@ -1569,7 +1596,12 @@ unsafe extern "system" fn vkCmdCopyImageToBuffer(
                     p_regions: regions.as_ptr(),
                     ..Default::default()
                 };
-                crate::command::transfer::cmd_copy_image_to_buffer2(recorder, &info)
+                crate::command::transfer::cmd_copy_image_to_buffer2(
+                    recorder,
+                    handle::get(info.src_image)?,
+                    handle::get(info.dst_buffer)?,
+                    valid::slice(info.p_regions, info.region_count)?,
+                )
             })
         }
     })
@@ -1822,11 +1854,13 @@ unsafe extern "system" fn vkCreateBufferView(
     guard(device, "vkCreateBufferView", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
+            let info = valid::input(p_create_info)?;
             valid::output(
                 p_view,
-                handle::create(crate::resource::buffer::create_buffer_view(valid::input(
-                    p_create_info,
-                )?)?),
+                handle::create(crate::resource::buffer::create_buffer_view(
+                    valid::input(p_create_info)?,
+                    handle::get(info.buffer)?,
+                )?),
             )
             .map(|()| vk::Result::SUCCESS)
         }
@@ -1970,10 +2004,15 @@ unsafe extern "system" fn vkCreatePipelineLayout(
     guard(device, "vkCreatePipelineLayout", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
+            let info = valid::input(p_create_info)?;
             valid::output(
                 p_pipeline_layout,
                 handle::create(crate::pipeline::layout::create_pipeline_layout(
-                    valid::input(p_create_info)?,
+                    &handle::get_all_optional(valid::slice(
+                        info.p_set_layouts,
+                        info.set_layout_count,
+                    )?)?,
+                    valid::slice(info.p_push_constant_ranges, info.push_constant_range_count)?,
                 )?),
             )
             .map(|()| vk::Result::SUCCESS)
@@ -2063,10 +2102,13 @@ unsafe extern "system" fn vkCreateDescriptorPool(
     guard(device, "vkCreateDescriptorPool", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
+            let info = valid::input(p_create_info)?;
             valid::output(
                 p_descriptor_pool,
                 handle::create(crate::descriptor::pool::create_descriptor_pool(
-                    valid::input(p_create_info)?,
+                    info.flags,
+                    info.max_sets,
+                    valid::slice(info.p_pool_sizes, info.pool_size_count)?,
                 )?),
             )
             .map(|()| vk::Result::SUCCESS)
@@ -2402,11 +2444,13 @@ unsafe extern "system" fn vkCreateRenderPass(
     guard(device, "vkCreateRenderPass", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
+            let info = valid::input(p_create_info)?;
             valid::output(
                 p_render_pass,
-                handle::create(crate::render_pass::create_render_pass(valid::input(
-                    p_create_info,
-                )?)?),
+                handle::create(crate::render_pass::create_render_pass(
+                    valid::input(p_create_info)?,
+                    valid::find_in_chain::<vk::RenderPassMultiviewCreateInfo<'_>>(info.p_next),
+                )?),
             )
             .map(|()| vk::Result::SUCCESS)
         }
@@ -2777,7 +2821,13 @@ unsafe extern "system" fn vkCmdBlitImage(
                     filter,
                     ..Default::default()
                 };
-                crate::command::transfer::cmd_blit_image2(recorder, &info)
+                crate::command::transfer::cmd_blit_image2(
+                    recorder,
+                    handle::get(info.src_image)?,
+                    handle::get(info.dst_image)?,
+                    valid::slice(info.p_regions, info.region_count)?,
+                    info.filter,
+                )
             })
         }
     })
@@ -2862,7 +2912,12 @@ unsafe extern "system" fn vkCmdResolveImage(
                     p_regions: regions.as_ptr(),
                     ..Default::default()
                 };
-                crate::command::transfer::cmd_resolve_image2(recorder, &info)
+                crate::command::transfer::cmd_resolve_image2(
+                    recorder,
+                    handle::get(info.src_image)?,
+                    handle::get(info.dst_image)?,
+                    valid::slice(info.p_regions, info.region_count)?,
+                )
             })
         }
     })
@@ -3011,8 +3066,9 @@ unsafe extern "system" fn vkGetImageMemoryRequirements2(
     guard(device, "vkGetImageMemoryRequirements2", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
+            let info = valid::input(p_info)?;
             crate::resource::image::get_image_memory_requirements2(
-                valid::input(p_info)?,
+                handle::get(info.image)?,
                 OutputChain::new(p_memory_requirements)?,
             )
         }
@@ -3027,8 +3083,9 @@ unsafe extern "system" fn vkGetBufferMemoryRequirements2(
     guard(device, "vkGetBufferMemoryRequirements2", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
+            let info = valid::input(p_info)?;
             crate::resource::buffer::get_buffer_memory_requirements2(
-                valid::input(p_info)?,
+                handle::get(info.buffer)?,
                 OutputChain::new(p_memory_requirements)?,
             )
         }
@@ -3417,7 +3474,14 @@ unsafe extern "system" fn vkWaitSemaphores(
     guard(device, "vkWaitSemaphores", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            crate::sync::wait_semaphores(handle::get(device)?, valid::input(p_wait_info)?, timeout)
+            let info = valid::input(p_wait_info)?;
+            crate::sync::wait_semaphores(
+                handle::get(device)?,
+                info.flags,
+                &handle::get_all(valid::slice(info.p_semaphores, info.semaphore_count)?)?,
+                valid::slice(info.p_values, info.semaphore_count)?,
+                timeout,
+            )
         }
     })
 }
@@ -3429,7 +3493,8 @@ unsafe extern "system" fn vkSignalSemaphore(
     guard(device, "vkSignalSemaphore", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            crate::sync::signal_semaphore(valid::input(p_signal_info)?)
+            let info = valid::input(p_signal_info)?;
+            crate::sync::signal_semaphore(handle::get(info.semaphore)?, info.value)
                 .map(|()| vk::Result::SUCCESS)
         }
     })
@@ -3441,7 +3506,10 @@ unsafe extern "system" fn vkGetBufferDeviceAddress(
 ) -> vk::DeviceAddress {
     guard(device, "vkGetBufferDeviceAddress", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-        unsafe { crate::resource::buffer::get_buffer_device_address(valid::input(p_info)?) }
+        unsafe {
+            let info = valid::input(p_info)?;
+            crate::resource::buffer::get_buffer_device_address(handle::get(info.buffer)?)
+        }
     })
 }
 
@@ -3451,7 +3519,10 @@ unsafe extern "system" fn vkGetBufferOpaqueCaptureAddress(
 ) -> u64 {
     guard(device, "vkGetBufferOpaqueCaptureAddress", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-        unsafe { crate::resource::buffer::get_buffer_opaque_capture_address(valid::input(p_info)?) }
+        unsafe {
+            let info = valid::input(p_info)?;
+            crate::resource::buffer::get_buffer_opaque_capture_address(handle::get(info.buffer)?)
+        }
     })
 }
 
@@ -3738,9 +3809,12 @@ unsafe extern "system" fn vkCmdCopyBuffer2(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdCopyBuffer2", |recorder| {
+                let info = valid::input(p_copy_buffer_info)?;
                 crate::command::transfer::cmd_copy_buffer2(
                     recorder,
-                    valid::input(p_copy_buffer_info)?,
+                    handle::get(info.src_buffer)?,
+                    handle::get(info.dst_buffer)?,
+                    valid::slice(info.p_regions, info.region_count)?,
                 )
             })
         }
@@ -3755,9 +3829,12 @@ unsafe extern "system" fn vkCmdCopyImage2(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdCopyImage2", |recorder| {
+                let info = valid::input(p_copy_image_info)?;
                 crate::command::transfer::cmd_copy_image2(
                     recorder,
-                    valid::input(p_copy_image_info)?,
+                    handle::get(info.src_image)?,
+                    handle::get(info.dst_image)?,
+                    valid::slice(info.p_regions, info.region_count)?,
                 )
             })
         }
@@ -3772,9 +3849,12 @@ unsafe extern "system" fn vkCmdCopyBufferToImage2(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdCopyBufferToImage2", |recorder| {
+                let info = valid::input(p_copy_buffer_to_image_info)?;
                 crate::command::transfer::cmd_copy_buffer_to_image2(
                     recorder,
-                    valid::input(p_copy_buffer_to_image_info)?,
+                    handle::get(info.src_buffer)?,
+                    handle::get(info.dst_image)?,
+                    valid::slice(info.p_regions, info.region_count)?,
                 )
             })
         }
@@ -3789,9 +3869,12 @@ unsafe extern "system" fn vkCmdCopyImageToBuffer2(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdCopyImageToBuffer2", |recorder| {
+                let info = valid::input(p_copy_image_to_buffer_info)?;
                 crate::command::transfer::cmd_copy_image_to_buffer2(
                     recorder,
-                    valid::input(p_copy_image_to_buffer_info)?,
+                    handle::get(info.src_image)?,
+                    handle::get(info.dst_buffer)?,
+                    valid::slice(info.p_regions, info.region_count)?,
                 )
             })
         }
@@ -3806,8 +3889,9 @@ unsafe extern "system" fn vkGetDeviceBufferMemoryRequirements(
     guard(device, "vkGetDeviceBufferMemoryRequirements", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
+            let info = valid::input(p_info)?;
             crate::resource::buffer::get_device_buffer_memory_requirements(
-                valid::input(p_info)?,
+                valid::input(info.p_create_info)?,
                 OutputChain::new(p_memory_requirements)?,
             )
         }
@@ -3822,8 +3906,9 @@ unsafe extern "system" fn vkGetDeviceImageMemoryRequirements(
     guard(device, "vkGetDeviceImageMemoryRequirements", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
+            let info = valid::input(p_info)?;
             crate::resource::image::get_device_image_memory_requirements(
-                valid::input(p_info)?,
+                valid::input(info.p_create_info)?,
                 OutputChain::new(p_memory_requirements)?,
             )
         }
@@ -3904,9 +3989,13 @@ unsafe extern "system" fn vkCmdBlitImage2(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdBlitImage2", |recorder| {
+                let info = valid::input(p_blit_image_info)?;
                 crate::command::transfer::cmd_blit_image2(
                     recorder,
-                    valid::input(p_blit_image_info)?,
+                    handle::get(info.src_image)?,
+                    handle::get(info.dst_image)?,
+                    valid::slice(info.p_regions, info.region_count)?,
+                    info.filter,
                 )
             })
         }
@@ -3921,9 +4010,12 @@ unsafe extern "system" fn vkCmdResolveImage2(
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(command_buffer, "vkCmdResolveImage2", |recorder| {
+                let info = valid::input(p_resolve_image_info)?;
                 crate::command::transfer::cmd_resolve_image2(
                     recorder,
-                    valid::input(p_resolve_image_info)?,
+                    handle::get(info.src_image)?,
+                    handle::get(info.dst_image)?,
+                    valid::slice(info.p_regions, info.region_count)?,
                 )
             })
         }
@@ -4444,9 +4536,14 @@ unsafe extern "system" fn vkMapMemory2KHR(
     guard(device, "vkMapMemory2KHR", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
+            let info = valid::input(p_memory_map_info)?;
             valid::output(
                 pp_data,
-                crate::resource::memory::map_memory2(valid::input(p_memory_map_info)?)?,
+                crate::resource::memory::map_memory(
+                    handle::get(info.memory)?,
+                    info.offset,
+                    info.size,
+                )?,
             )
             .map(|()| vk::Result::SUCCESS)
         }
@@ -4460,7 +4557,8 @@ unsafe extern "system" fn vkUnmapMemory2KHR(
     guard(device, "vkUnmapMemory2KHR", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            crate::resource::memory::unmap_memory2(valid::input(p_memory_unmap_info)?)
+            let info = valid::input(p_memory_unmap_info)?;
+            crate::resource::memory::unmap_memory(handle::get(info.memory)?)
                 .map(|()| vk::Result::SUCCESS)
         }
     })

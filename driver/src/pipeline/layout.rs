@@ -1,8 +1,7 @@
 //! Pipeline layouts.
 
 use crate::abi::error::Error;
-use crate::abi::handle::{self, objects};
-use crate::abi::valid;
+use crate::abi::handle::objects;
 use crate::descriptor::layout::DescriptorSetLayout;
 use crate::physical_device::limits;
 use ash::vk;
@@ -195,23 +194,11 @@ fn kind(ty: vk::DescriptorType) -> Option<DescriptorKind> {
     }
 }
 
-/// # Safety
-/// The create info and its handles are valid.
 #[doc(alias = "vkCreatePipelineLayout")]
-pub(crate) unsafe fn create_pipeline_layout(
-    create_info: &vk::PipelineLayoutCreateInfo<'_>,
+pub(crate) fn create_pipeline_layout(
+    set_layouts: &[Option<Arc<DescriptorSetLayout>>],
+    push_constant_ranges: &[vk::PushConstantRange],
 ) -> Result<Arc<PipelineLayout>, Error> {
-    let info = create_info;
-    // SAFETY: the caller's promise.
-    unsafe {
-        let set_layouts = valid::slice(info.p_set_layouts, info.set_layout_count)?
-            .iter()
-            .map(|&layout| Ok(handle::get_optional(layout)?.cloned()));
-        PipelineLayout::new(
-            set_layouts.collect::<Result<_, Error>>()?,
-            valid::slice(info.p_push_constant_ranges, info.push_constant_range_count)?,
-            limits::MAX_PUSH_CONSTANTS_SIZE,
-        )
-        .map(Arc::new)
-    }
+    let most = limits::MAX_PUSH_CONSTANTS_SIZE;
+    PipelineLayout::new(set_layouts.to_vec(), push_constant_ranges, most).map(Arc::new)
 }

@@ -3,7 +3,7 @@
 use super::memory::Memory;
 use crate::abi::error::Error;
 use crate::abi::handle::{self, objects};
-use crate::abi::valid::{self, OutputChain};
+use crate::abi::valid::OutputChain;
 use crate::device::Device;
 use crate::device_addresses::Addresses;
 use crate::physical_device::formats;
@@ -198,16 +198,11 @@ pub(crate) fn fits(
 }
 
 /// The buffer that a create info asks for.
-///
-/// # Safety
-/// The create info's chain is valid.
-unsafe fn new_buffer(
+fn new_buffer(
     info: &vk::BufferCreateInfo<'_>,
+    external: Option<&vk::ExternalMemoryBufferCreateInfo<'_>>,
     addresses: &Arc<Addresses>,
 ) -> Result<Buffer, Error> {
-    // SAFETY: the caller's promise.
-    let external =
-        unsafe { valid::find_in_chain::<vk::ExternalMemoryBufferCreateInfo>(info.p_next) };
     if external.is_some_and(|external| !external.handle_types.is_empty()) {
         return Err(Error::FeatureNotPresent("external memory".into()));
     }
@@ -251,37 +246,24 @@ pub(crate) fn fill_requirements(
     Ok(())
 }
 
-/// # Safety
-/// The create info's chain is valid.
 #[doc(alias = "vkCreateBuffer")]
-pub(crate) unsafe fn create_buffer(
+pub(crate) fn create_buffer(
     device: &Device,
     create_info: &vk::BufferCreateInfo<'_>,
+    external: Option<&vk::ExternalMemoryBufferCreateInfo<'_>>,
 ) -> Result<Arc<Buffer>, Error> {
-    // SAFETY: the caller's promise.
-    unsafe { new_buffer(create_info, device.addresses()) }.map(Arc::new)
+    new_buffer(create_info, external, device.addresses()).map(Arc::new)
 }
 
-/// # Safety
-/// The buffer is live.
 #[doc(alias = "vkGetBufferDeviceAddress")]
-pub(crate) unsafe fn get_buffer_device_address(
-    info: &vk::BufferDeviceAddressInfo<'_>,
-) -> Result<vk::DeviceAddress, Error> {
-    // SAFETY: the caller's promise.
-    unsafe { handle::get(info.buffer)? }.address()
+pub(crate) fn get_buffer_device_address(buffer: &Buffer) -> Result<vk::DeviceAddress, Error> {
+    buffer.address()
 }
 
 /// What an address is asked for by in a capture is the address; none is replayed.
-///
-/// # Safety
-/// The buffer is live.
 #[doc(alias = "vkGetBufferOpaqueCaptureAddress")]
-pub(crate) unsafe fn get_buffer_opaque_capture_address(
-    info: &vk::BufferDeviceAddressInfo<'_>,
-) -> Result<u64, Error> {
-    // SAFETY: the caller's promise.
-    unsafe { get_buffer_device_address(info) }
+pub(crate) fn get_buffer_opaque_capture_address(buffer: &Buffer) -> Result<u64, Error> {
+    buffer.address()
 }
 
 #[doc(alias = "vkGetBufferMemoryRequirements")]
@@ -291,27 +273,20 @@ pub(crate) fn get_buffer_memory_requirements(
     Ok(buffer.requirements())
 }
 
-/// # Safety
-/// The buffer is live.
 #[doc(alias = "vkGetBufferMemoryRequirements2")]
-pub(crate) unsafe fn get_buffer_memory_requirements2(
-    info: &vk::BufferMemoryRequirementsInfo2<'_>,
+pub(crate) fn get_buffer_memory_requirements2(
+    buffer: &Buffer,
     memory_requirements: OutputChain<'_, vk::MemoryRequirements2<'_>>,
 ) -> Result<(), Error> {
-    // SAFETY: the caller's promise.
-    let buffer = unsafe { handle::get(info.buffer)? };
     fill_requirements(memory_requirements, buffer.requirements())
 }
 
-/// # Safety
-/// The info's create info is valid.
 #[doc(alias = "vkGetDeviceBufferMemoryRequirements")]
-pub(crate) unsafe fn get_device_buffer_memory_requirements(
-    info: &vk::DeviceBufferMemoryRequirements<'_>,
+pub(crate) fn get_device_buffer_memory_requirements(
+    create_info: &vk::BufferCreateInfo<'_>,
     memory_requirements: OutputChain<'_, vk::MemoryRequirements2<'_>>,
 ) -> Result<(), Error> {
-    // SAFETY: the caller's promise.
-    let buffer = unsafe { new_buffer(valid::input(info.p_create_info)?, &Arc::default())? };
+    let buffer = new_buffer(create_info, None, &Arc::default())?;
     fill_requirements(memory_requirements, buffer.requirements())
 }
 
@@ -337,11 +312,10 @@ pub(crate) unsafe fn bind_buffer_memory2(
     })
 }
 
-/// # Safety
-/// The buffer is live.
 #[doc(alias = "vkCreateBufferView")]
-pub(crate) unsafe fn create_buffer_view(
+pub(crate) fn create_buffer_view(
     create_info: &vk::BufferViewCreateInfo<'_>,
+    buffer: &Buffer,
 ) -> Result<Arc<BufferView>, Error> {
     let info = create_info;
     let size = (info.range != vk::WHOLE_SIZE).then_some(info.range);
@@ -360,8 +334,6 @@ pub(crate) unsafe fn create_buffer_view(
             ),
         ));
     }
-    // SAFETY: the caller's promise.
-    let buffer = unsafe { handle::get(info.buffer)? };
     let range = buffer.range(info.offset, size, &VIEWED)?;
     let texels = range.size / format.texel_size().max(1) as u64;
     if texels > u64::from(MAX_TEXEL_BUFFER_ELEMENTS) {

@@ -4,7 +4,7 @@ use super::buffer::{self, fill_requirements};
 use super::memory::Memory;
 use crate::abi::error::Error;
 use crate::abi::handle::{self, objects};
-use crate::abi::valid::{self, OutputChain, Structures};
+use crate::abi::valid::{OutputChain, Structures};
 use crate::convert;
 use crate::physical_device::formats::{self, ImageQuery};
 use ash::vk;
@@ -175,13 +175,10 @@ fn unsupported_format(format: vk::Format) -> Error {
 }
 
 /// The image that a create info asks for.
-///
-/// # Safety
-/// The create info's chain is valid.
-unsafe fn new_image(info: &vk::ImageCreateInfo<'_>) -> Result<Image, Error> {
-    // SAFETY: the caller's promise.
-    let external =
-        unsafe { valid::find_in_chain::<vk::ExternalMemoryImageCreateInfo>(info.p_next) };
+fn new_image(
+    info: &vk::ImageCreateInfo<'_>,
+    external: Option<&vk::ExternalMemoryImageCreateInfo<'_>>,
+) -> Result<Image, Error> {
     if external.is_some_and(|external| !external.handle_types.is_empty()) {
         return Err(Error::FeatureNotPresent("external memory".into()));
     }
@@ -236,14 +233,12 @@ unsafe fn new_image(info: &vk::ImageCreateInfo<'_>) -> Result<Image, Error> {
     })
 }
 
-/// # Safety
-/// The create info's chain is valid.
 #[doc(alias = "vkCreateImage")]
-pub(crate) unsafe fn create_image(
+pub(crate) fn create_image(
     create_info: &vk::ImageCreateInfo<'_>,
+    external: Option<&vk::ExternalMemoryImageCreateInfo<'_>>,
 ) -> Result<Arc<Image>, Error> {
-    // SAFETY: the caller's promise.
-    unsafe { new_image(create_info) }.map(Arc::new)
+    new_image(create_info, external).map(Arc::new)
 }
 
 #[doc(alias = "vkGetImageMemoryRequirements")]
@@ -253,27 +248,20 @@ pub(crate) fn get_image_memory_requirements(
     Ok(image.requirements())
 }
 
-/// # Safety
-/// The image is live.
 #[doc(alias = "vkGetImageMemoryRequirements2")]
-pub(crate) unsafe fn get_image_memory_requirements2(
-    info: &vk::ImageMemoryRequirementsInfo2<'_>,
+pub(crate) fn get_image_memory_requirements2(
+    image: &Image,
     memory_requirements: OutputChain<'_, vk::MemoryRequirements2<'_>>,
 ) -> Result<(), Error> {
-    // SAFETY: the caller's promise.
-    let image = unsafe { handle::get(info.image)? };
     fill_requirements(memory_requirements, image.requirements())
 }
 
-/// # Safety
-/// The info's create info is valid.
 #[doc(alias = "vkGetDeviceImageMemoryRequirements")]
-pub(crate) unsafe fn get_device_image_memory_requirements(
-    info: &vk::DeviceImageMemoryRequirements<'_>,
+pub(crate) fn get_device_image_memory_requirements(
+    create_info: &vk::ImageCreateInfo<'_>,
     memory_requirements: OutputChain<'_, vk::MemoryRequirements2<'_>>,
 ) -> Result<(), Error> {
-    // SAFETY: the caller's promise.
-    let image = unsafe { new_image(valid::input(info.p_create_info)?)? };
+    let image = new_image(create_info, None)?;
     fill_requirements(memory_requirements, image.requirements())
 }
 
@@ -340,15 +328,12 @@ pub(crate) unsafe fn bind_image_memory2(
     })
 }
 
-/// # Safety
-/// The image is live.
 #[doc(alias = "vkCreateImageView")]
-pub(crate) unsafe fn create_image_view(
+pub(crate) fn create_image_view(
     create_info: &vk::ImageViewCreateInfo<'_>,
+    image: &Arc<Image>,
 ) -> Result<Arc<ImageView>, Error> {
     let info = create_info;
-    // SAFETY: the caller's promise.
-    let image = unsafe { handle::get(info.image)? };
     let format =
         formats::device_format(info.format).ok_or_else(|| unsupported_format(info.format))?;
     let view = ImageView::new(

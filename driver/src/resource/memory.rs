@@ -2,7 +2,6 @@
 
 use crate::abi::error::Error;
 use crate::abi::handle::{self, objects};
-use crate::abi::valid;
 use crate::device::Device;
 use crate::physical_device::memory::Heap;
 use ash::vk;
@@ -93,16 +92,13 @@ impl Drop for Memory {
     }
 }
 
-/// # Safety
-/// The allocate info's chain is valid.
 #[doc(alias = "vkAllocateMemory")]
-pub(crate) unsafe fn allocate_memory(
+pub(crate) fn allocate_memory(
     device: &Device,
     allocate_info: &vk::MemoryAllocateInfo<'_>,
+    exports: Option<&vk::ExportMemoryAllocateInfo<'_>>,
 ) -> Result<Arc<Memory>, Error> {
     let info = allocate_info;
-    // SAFETY: the caller's promise.
-    let exports = unsafe { valid::find_in_chain::<vk::ExportMemoryAllocateInfo>(info.p_next) };
     if exports.is_some_and(|export| !export.handle_types.is_empty()) {
         return Err(Error::FeatureNotPresent("exporting memory".into()));
     }
@@ -116,6 +112,7 @@ pub(crate) unsafe fn allocate_memory(
 }
 
 #[doc(alias = "vkMapMemory")]
+#[doc(alias = "vkMapMemory2KHR")]
 pub(crate) fn map_memory(
     memory: &Memory,
     offset: vk::DeviceSize,
@@ -126,30 +123,10 @@ pub(crate) fn map_memory(
 }
 
 #[doc(alias = "vkUnmapMemory")]
+#[doc(alias = "vkUnmapMemory2KHR")]
 pub(crate) fn unmap_memory(memory: &Memory) -> Result<(), Error> {
     memory.unmap();
     Ok(())
-}
-
-/// # Safety
-/// The memory is live.
-#[doc(alias = "vkMapMemory2KHR")]
-pub(crate) unsafe fn map_memory2(
-    memory_map_info: &vk::MemoryMapInfoKHR<'_>,
-) -> Result<*mut c_void, Error> {
-    // SAFETY: the caller's promise.
-    let memory = unsafe { handle::get(memory_map_info.memory)? };
-    map_memory(memory, memory_map_info.offset, memory_map_info.size)
-}
-
-/// # Safety
-/// The memory is live.
-#[doc(alias = "vkUnmapMemory2KHR")]
-pub(crate) unsafe fn unmap_memory2(
-    memory_unmap_info: &vk::MemoryUnmapInfoKHR<'_>,
-) -> Result<(), Error> {
-    // SAFETY: the caller's promise.
-    unmap_memory(unsafe { handle::get(memory_unmap_info.memory)? })
 }
 
 /// All host-visible memory is coherent.
