@@ -7,17 +7,17 @@
 use super::lod;
 use super::sampler::Sampler;
 use super::surface::Surface;
-use isa::ir::{CHUNK_LANES, Dimension};
+use isa::ir::{VECTOR_LANES, Dimension};
 use isa::resources::{LaneWords, LodRequest, SampleRequest};
 
 /// The footprints of 16 lanes.
 struct Footprints {
     /// The samples along each.
-    counts: [u32; CHUNK_LANES],
+    counts: [u32; VECTOR_LANES],
     /// The level of detail of each sample, before the sampler's bias.
-    lod: Lanes,
+    lod: LaneWords,
     /// The length of each, in normalized coordinates.
-    length: [[f32; CHUNK_LANES]; 2],
+    length: [[f32; VECTOR_LANES]; 2],
 }
 
 /// Samples along the footprint with what samples once; None if the request is no anisotropic one.
@@ -41,12 +41,12 @@ pub(super) fn sample(
     if most <= 1 {
         return None;
     }
-    let mut sums = [[0f32; CHUNK_LANES]; 4];
+    let mut sums = [[0f32; VECTOR_LANES]; 4];
     for number in 1..=most {
         let mut part = *request;
         part.lod = LodRequest::Explicit(footprints.lod);
         part.mask = 0;
-        for lane in 0..CHUNK_LANES {
+        for lane in 0..VECTOR_LANES {
             let count = footprints.counts[lane];
             if number > count {
                 continue;
@@ -63,7 +63,7 @@ pub(super) fn sample(
             continue;
         }
         let texel = once(&part);
-        for lane in (0..CHUNK_LANES).filter(|lane| part.mask >> lane & 1 != 0) {
+        for lane in (0..VECTOR_LANES).filter(|lane| part.mask >> lane & 1 != 0) {
             let weight = 1.0 / footprints.counts[lane] as f32;
             for (sum, component) in sums.iter_mut().zip(&texel) {
                 sum[lane] += weight * f32::from_bits(component[lane]);
@@ -76,17 +76,17 @@ pub(super) fn sample(
 /// The footprints that a request's derivatives mean.
 fn footprints(surface: &Surface, sampler: &Sampler, request: &SampleRequest) -> Footprints {
     let mut footprints = Footprints {
-        counts: [1; CHUNK_LANES],
-        lod: [0; CHUNK_LANES],
-        length: [[0.0; CHUNK_LANES]; 2],
+        counts: [1; VECTOR_LANES],
+        lod: [0; VECTOR_LANES],
+        length: [[0.0; VECTOR_LANES]; 2],
     };
     let extent = surface.levels[0].extent;
     let size = [extent[0] as f32, extent[1] as f32];
     let value = |axis: usize, lane: usize| f32::from_bits(request.coordinate[axis][lane]);
-    for lane in 0..CHUNK_LANES {
+    for lane in 0..VECTOR_LANES {
         let (dx, dy) = match &request.lod {
             LodRequest::Gradient { dx, dy, .. } => {
-                let along = |d: &[Lanes; 3]| [0, 1].map(|axis| f32::from_bits(d[axis][lane]));
+                let along = |d: &[LaneWords; 3]| [0, 1].map(|axis| f32::from_bits(d[axis][lane]));
                 (along(dx), along(dy))
             }
             _ => {

@@ -5,7 +5,8 @@ use std::sync::Arc;
 use crate::common::translated;
 use fearless_simd::Level;
 use gaurast_spirv::{BuiltIn, InputSource, OutputTarget, Sampling, Shader, Specialization};
-use isa::exec::{Executable, LaneMask, Machine, Options as ExecOptions, Watchdog};
+use isa::Options as ExecOptions;
+use isa::machine::{Executable, LaneMask, Machine, Watchdog};
 use isa::resources::Resources;
 
 const LANES: usize = 16;
