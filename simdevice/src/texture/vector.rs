@@ -334,14 +334,14 @@ impl<S: Simd> Batch<'_, S> {
 /// The mip level of each lane.
 struct LevelSizes<'a> {
     table: &'a [PackedLevel],
-    levels: &'a Lanes,
+    levels: &'a LaneWords,
     /// The level of all lanes, if it is one.
     uniform: Option<&'a PackedLevel>,
 }
 
 impl<'a> LevelSizes<'a> {
     #[inline(always)]
-    fn new(table: &'a [PackedLevel], levels: &'a Lanes) -> Self {
+    fn new(table: &'a [PackedLevel], levels: &'a LaneWords) -> Self {
         let differences = levels.iter().map(|level| level ^ levels[0]);
         let uniform = differences.fold(0, |all, difference| all | difference) == 0;
         Self {
@@ -363,7 +363,7 @@ impl<'a> LevelSizes<'a> {
 
 /// Moves texels on by some steps.
 #[inline(always)]
-fn advance(base: &mut Lanes, steps: &LaneWords, pitch: &LaneWords) {
+fn advance(base: &mut LaneWords, steps: &LaneWords, pitch: &LaneWords) {
     for lane in 0..VECTOR_LANES {
         base[lane] = base[lane].wrapping_add(steps[lane].wrapping_mul(pitch[lane]));
     }
