@@ -14,7 +14,7 @@ use std::sync::Arc;
 use fearless_simd::Level;
 use gaurast_runner::Case;
 
-use super::Options;
+use super::compiler::Options;
 use super::ir::Program;
 use super::machine::{Executable, LaneMask, Machine, Watchdog};
 use super::resources::Resources;

@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use fearless_simd::Level;
 
-use crate::Options;
 use crate::builder::Builder;
+use crate::compiler::Options;
 use crate::ir::{Address, Block, Format, Label, Program, Rate, Reg, Space, Type};
 use crate::machine::{Executable, LaneMask, Machine, Watchdog};
 use crate::op::Op;

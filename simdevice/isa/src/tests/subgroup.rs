@@ -1,7 +1,7 @@
 //! Operations across lanes.
 
-use crate::Options;
 use crate::builder::Builder;
+use crate::compiler::Options;
 use crate::ir::{Axis, Program, Rate, Reg, SubgroupOp, Type};
 use crate::machine::{Executable, LaneMask, Machine, Watchdog};
 use crate::op::Op;

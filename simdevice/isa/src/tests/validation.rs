@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use fearless_simd::Level;
 
-use crate::Options;
 use crate::builder::Builder;
+use crate::compiler::Options;
 use crate::ir::{Address, Format, Label, Rate, Reg, Space, Statement, Type};
 use crate::machine::{Executable, LaneMask, Machine, Stopped, Watchdog};
 use crate::op::Op;
