@@ -3,8 +3,9 @@
 use super::buffer::Recorder;
 use super::{BindPoint, BindSets, BoundSet, Command, IndexBuffer, PushDescriptors, VertexBuffer};
 use crate::abi::error::Error;
+use crate::abi::handle::Handles;
 use crate::descriptor::layout::DescriptorSetLayout;
-use crate::descriptor::set::{self, DescriptorSet, UpdateTemplate};
+use crate::descriptor::set::{self, UpdateTemplate};
 use crate::physical_device::limits;
 use crate::pipeline::Pipeline;
 use crate::pipeline::layout::PipelineLayout;
@@ -41,7 +42,7 @@ pub(crate) fn cmd_bind_pipeline(
 pub(crate) fn cmd_bind_vertex_buffers(
     recorder: &mut Recorder,
     first_binding: u32,
-    buffers: &[Arc<Buffer>],
+    buffers: Handles<'_, vk::Buffer>,
     offsets: &[vk::DeviceSize],
 ) -> Result<(), Error> {
     bind_vertex_buffers(recorder, first_binding, buffers, offsets, &[], &[])
@@ -51,7 +52,7 @@ pub(crate) fn cmd_bind_vertex_buffers(
 pub(crate) fn cmd_bind_vertex_buffers2(
     recorder: &mut Recorder,
     first_binding: u32,
-    buffers: &[Arc<Buffer>],
+    buffers: Handles<'_, vk::Buffer>,
     offsets: &[vk::DeviceSize],
     sizes: Option<&[vk::DeviceSize]>,
     strides: Option<&[vk::DeviceSize]>,
@@ -96,7 +97,7 @@ pub(crate) fn cmd_bind_index_buffer(
 fn bind_vertex_buffers(
     recorder: &mut Recorder,
     first: u32,
-    buffers: &[Arc<Buffer>],
+    buffers: Handles<'_, vk::Buffer>,
     offsets: &[vk::DeviceSize],
     sizes: &[vk::DeviceSize],
     strides: &[vk::DeviceSize],
@@ -109,10 +110,10 @@ fn bind_vertex_buffers(
         ));
     }
     let mut bound = simdevice::host::with_capacity(buffers.len());
-    for (index, (buffer, &offset)) in buffers.iter().zip(offsets).enumerate() {
+    for (index, (buffer, &offset)) in buffers.objects().zip(offsets).enumerate() {
         let size = sizes.get(index).copied().unwrap_or(vk::WHOLE_SIZE);
         bound.push(VertexBuffer {
-            range: buffer.range(
+            range: buffer?.range(
                 offset,
                 (size != vk::WHOLE_SIZE).then_some(size),
                 &VERTEX_BUFFERS,
@@ -133,12 +134,13 @@ pub(crate) fn cmd_bind_descriptor_sets(
     pipeline_bind_point: vk::PipelineBindPoint,
     layout: &PipelineLayout,
     first_set: u32,
-    descriptor_sets: &[Arc<DescriptorSet>],
+    descriptor_sets: Handles<'_, vk::DescriptorSet>,
     dynamic_offsets: &[u32],
 ) -> Result<(), Error> {
     let mut rest = dynamic_offsets;
     let mut bound = simdevice::host::with_capacity(descriptor_sets.len());
-    for (number, set) in (first_set..).zip(descriptor_sets) {
+    for (number, set) in (first_set..).zip(descriptor_sets.objects()) {
+        let set = set?;
         layout.set_layout(number)?;
         let count = set.layout().dynamic_count();
         let Some((own, others)) = rest.split_at_checked(count) else {
