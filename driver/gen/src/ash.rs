@@ -1,8 +1,9 @@
 //! Declarations of ash, and of gaurast beside it: the Rust names and types of the registry's things.
 
 use crate::error::Error;
+use crate::file::File;
 use crate::registry::Registry;
-use crate::{File, rust};
+use crate::rust;
 use proc_macro2::{Group, TokenStream, TokenTree};
 use quote::ToTokens;
 use std::collections::HashMap;

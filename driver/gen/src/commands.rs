@@ -1,14 +1,14 @@
 //! Writes `dispatch/commands.rs`: the functions that Vulkan calls, around the driver's own, and the table of them.
 //!
-//! A function of the driver's takes those of its command's parameters that it wants, by their names without `p_`, or of the
-//! members of the structure that one points at, and each in the form that it declares: the command's own type; a handle as the object (`&Buffer`, `&Arc<Buffer>`,
-//! `Option<&Buffer>`, or, to be destroyed, `Option<Arc<Buffer>>`); a pointer as what it points at (`&T`, `&mut T`,
-//! `Option<&T>`, `&[T]`, `&[Arc<Buffer>]`, `&CStr`, `&mut [MaybeUninit<T>]`, `OutputChain<'_, T>`, and with its count
-//! `Structures<'_, T>`); a `VkBool32` as a `bool`; a command buffer as its `recorder`; a structure of the chain as `Option<&T>`; and `&Commands`,
-//! the table. An output
-//! pointer that it doesn't take is written with what it returns: a value, an `Arc` of an object, or a list. Of commands that
-//! have a second version, which takes a structure of the first one's parameters, the second is enough. A command that does
-//! nothing but set a dynamic state whose value is its parameter needs no function at all.
+//! A function of the driver's takes those of its command's parameters that it wants, by their names without `p_`, or
+//! of the members of the structure that one points at, and each in the form that it declares: the command's own type;
+//! a handle as the object (`&Buffer`, `&Arc<Buffer>`, `Option<&Buffer>`, or, to be destroyed, `Option<Arc<Buffer>>`);
+//! a pointer as what it points at (`&T`, `&mut T`, `Option<&T>`, `&[T]`, `&[Arc<Buffer>]`, `Handles<'_, vk::Buffer>`,
+//! `&CStr`, `&mut [MaybeUninit<T>]`, `OutputChain<'_, T>`, and with its count `Structures<'_, T>`); a `VkBool32` as a
+//! `bool`; a command buffer as its `recorder`; a structure of the chain as `Option<&T>`; and `&Commands`, the table.
+//! An output pointer that it doesn't take is written with what it returns: a value, an `Arc` of an object, or a list.
+//! Of commands that have a second version, which takes a structure of the first one's parameters, the second is
+//! enough. A command that does nothing but set a dynamic state whose value is its parameter needs no function at all.
 
 use crate::ash::{self, Declarations, Function, Member};
 use crate::dynamic_states;
@@ -729,6 +729,8 @@ fn convert(wanted: &str, declared: &Member, count: Option<&Count>) -> Option<(St
                 slice
             } else if wanted == "&[u8]" && pointee == "c_void" {
                 format!("valid::slice({name}.cast::<u8>(), {count})?")
+            } else if wanted == format!("Handles<,{pointee}>") {
+                format!("handle::Handles::new({slice})")
             } else if wanted.starts_with("&[Arc<") {
                 format!("&handle::get_all({slice})?")
             } else if wanted.starts_with("&[Option<Arc<") {

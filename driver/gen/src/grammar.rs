@@ -1,7 +1,8 @@
 //! Writes the grammar of SPIR-V.
 
 use crate::error::Error;
-use crate::{File, registry, rust};
+use crate::file::File;
+use crate::{registry, rust};
 use serde::Deserialize;
 use spirv::{Decoration, ExecutionMode, Op};
 use std::collections::{BTreeMap, BTreeSet};

@@ -16,6 +16,7 @@ mod entry_points;
 mod error;
 mod extensions;
 mod features;
+mod file;
 mod grammar;
 mod properties;
 mod registry;
@@ -24,21 +25,13 @@ mod spirv;
 mod support;
 
 pub use error::Error;
+pub use file::File;
 pub use grammar::generate as generate_grammar;
 
 use crate::ash::Declarations;
 use crate::registry::Registry;
 use crate::support::Support;
 use std::path::Path;
-
-/// A generated file.
-#[derive(Debug)]
-pub struct File {
-    /// Its path from the root of the repository.
-    pub path: &'static str,
-    /// Its contents.
-    pub text: String,
-}
 
 /// Generates all files from a registry, for the repository that has its root at `root`.
 ///

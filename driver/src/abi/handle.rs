@@ -164,6 +164,39 @@ pub(crate) unsafe fn get_all<H: Handle>(handles: &[H]) -> Result<Vec<Arc<H::Obje
         .collect()
 }
 
+/// Live handles, whose objects are looked up one by one, without a list of them.
+#[derive(Clone, Copy)]
+pub(crate) struct Handles<'a, H>(&'a [H]);
+
+impl<'a, H: Handle> Handles<'a, H> {
+    /// The handles of an array.
+    ///
+    /// # Safety
+    /// As [`get`], for each.
+    pub(crate) unsafe fn new(handles: &'a [H]) -> Self {
+        Self(handles)
+    }
+
+    /// The number of handles.
+    pub(crate) fn len(self) -> usize {
+        self.0.len()
+    }
+
+    /// Their objects; [`Error::InvalidHandle`] for a handle that is null or of another type.
+    pub(crate) fn objects(self) -> impl Iterator<Item = Result<&'a Arc<H::Object>, Error>> {
+        // SAFETY: the promise of `new`.
+        self.0.iter().map(|&handle| unsafe { get(handle) })
+    }
+
+    /// Their objects, of which null handles have none; [`Error::InvalidHandle`] for a handle of another type.
+    pub(crate) fn optional_objects(
+        self,
+    ) -> impl Iterator<Item = Result<Option<&'a Arc<H::Object>>, Error>> {
+        // SAFETY: the promise of `new`.
+        self.0.iter().map(|&handle| unsafe { get_optional(handle) })
+    }
+}
+
 /// The objects of several handles, of which null ones have none.
 ///
 /// # Errors

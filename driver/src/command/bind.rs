@@ -3,9 +3,9 @@
 use super::buffer::Recorder;
 use super::{BindPoint, BindSets, BoundSet, Command, IndexBuffer, PushDescriptors, VertexBuffer};
 use crate::abi::error::Error;
-use crate::abi::handle;
+use crate::abi::handle::Handles;
 use crate::descriptor::layout::DescriptorSetLayout;
-use crate::descriptor::set::{self, DescriptorSet, UpdateTemplate};
+use crate::descriptor::set::{self, UpdateTemplate};
 use crate::physical_device::limits;
 use crate::pipeline::Pipeline;
 use crate::pipeline::layout::PipelineLayout;
@@ -40,33 +40,27 @@ pub(crate) fn cmd_bind_pipeline(
     Ok(())
 }
 
-/// # Safety
-/// The buffers are live, or null.
 #[doc(alias = "vkCmdBindVertexBuffers")]
-pub(crate) unsafe fn cmd_bind_vertex_buffers(
+pub(crate) fn cmd_bind_vertex_buffers(
     recorder: &mut Recorder,
     first_binding: u32,
-    buffers: &[vk::Buffer],
+    buffers: Handles<'_, vk::Buffer>,
     offsets: &[vk::DeviceSize],
 ) -> Result<(), Error> {
-    // SAFETY: the caller's promise.
-    unsafe { bind_vertex_buffers(recorder, first_binding, buffers, offsets, &[], &[]) }
+    bind_vertex_buffers(recorder, first_binding, buffers, offsets, &[], &[])
 }
 
-/// # Safety
-/// The buffers are live, or null.
 #[doc(alias = "vkCmdBindVertexBuffers2")]
-pub(crate) unsafe fn cmd_bind_vertex_buffers2(
+pub(crate) fn cmd_bind_vertex_buffers2(
     recorder: &mut Recorder,
     first_binding: u32,
-    buffers: &[vk::Buffer],
+    buffers: Handles<'_, vk::Buffer>,
     offsets: &[vk::DeviceSize],
     sizes: Option<&[vk::DeviceSize]>,
     strides: Option<&[vk::DeviceSize]>,
 ) -> Result<(), Error> {
     let (sizes, strides) = (sizes.unwrap_or_default(), strides.unwrap_or_default());
-    // SAFETY: the caller's promise.
-    unsafe { bind_vertex_buffers(recorder, first_binding, buffers, offsets, sizes, strides) }
+    bind_vertex_buffers(recorder, first_binding, buffers, offsets, sizes, strides)
 }
 
 /// No bytes: what a null buffer has.
@@ -113,13 +107,10 @@ pub(crate) fn cmd_bind_index_buffer(
 }
 
 /// Records vertex buffers; `sizes` and `strides` are empty or have one for each. From a null buffer vertices read zero.
-///
-/// # Safety
-/// The buffers are live, or null.
-unsafe fn bind_vertex_buffers(
+fn bind_vertex_buffers(
     recorder: &mut Recorder,
     first: u32,
-    buffers: &[vk::Buffer],
+    buffers: Handles<'_, vk::Buffer>,
     offsets: &[vk::DeviceSize],
     sizes: &[vk::DeviceSize],
     strides: &[vk::DeviceSize],
@@ -132,10 +123,9 @@ unsafe fn bind_vertex_buffers(
         ));
     }
     let mut bound = simdevice::host::with_capacity(buffers.len());
-    for (index, (&buffer, &offset)) in buffers.iter().zip(offsets).enumerate() {
+    for (index, (buffer, &offset)) in buffers.optional_objects().zip(offsets).enumerate() {
         let size = sizes.get(index).copied().unwrap_or(vk::WHOLE_SIZE);
-        // SAFETY: the caller's promise.
-        let range = match unsafe { handle::get_optional(buffer)? } {
+        let range = match buffer? {
             Some(buffer) => {
                 let size = (size != vk::WHOLE_SIZE).then_some(size);
                 buffer.range(offset, size, &VERTEX_BUFFERS)?
@@ -160,12 +150,13 @@ pub(crate) fn cmd_bind_descriptor_sets(
     pipeline_bind_point: vk::PipelineBindPoint,
     layout: &PipelineLayout,
     first_set: u32,
-    descriptor_sets: &[Arc<DescriptorSet>],
+    descriptor_sets: Handles<'_, vk::DescriptorSet>,
     dynamic_offsets: &[u32],
 ) -> Result<(), Error> {
     let mut rest = dynamic_offsets;
     let mut bound = simdevice::host::with_capacity(descriptor_sets.len());
-    for (number, set) in (first_set..).zip(descriptor_sets) {
+    for (number, set) in (first_set..).zip(descriptor_sets.objects()) {
+        let set = set?;
         layout.set_layout(number)?;
         let count = set.layout().dynamic_count();
         let Some((own, others)) = rest.split_at_checked(count) else {

@@ -2238,7 +2238,7 @@ unsafe extern "system" fn vkCmdBindDescriptorSets(
                     pipeline_bind_point,
                     handle::get(layout)?,
                     first_set,
-                    &handle::get_all(valid::slice(p_descriptor_sets, descriptor_set_count)?)?,
+                    handle::Handles::new(valid::slice(p_descriptor_sets, descriptor_set_count)?),
                     valid::slice(p_dynamic_offsets, dynamic_offset_count)?,
                 )
             })
@@ -2683,7 +2683,7 @@ unsafe extern "system" fn vkCmdBindVertexBuffers(
                 crate::command::bind::cmd_bind_vertex_buffers(
                     recorder,
                     first_binding,
-                    valid::slice(p_buffers, binding_count)?,
+                    handle::Handles::new(valid::slice(p_buffers, binding_count)?),
                     valid::slice(p_offsets, binding_count)?,
                 )
             })
@@ -4149,7 +4149,7 @@ unsafe extern "system" fn vkCmdBindVertexBuffers2(
                 crate::command::bind::cmd_bind_vertex_buffers2(
                     recorder,
                     first_binding,
-                    valid::slice(p_buffers, binding_count)?,
+                    handle::Handles::new(valid::slice(p_buffers, binding_count)?),
                     valid::slice(p_offsets, binding_count)?,
                     (!p_sizes.is_null())
                         .then(|| valid::slice(p_sizes, binding_count))

@@ -5,8 +5,7 @@ use crate::polygons::{Made, Request, Vertex, vertex};
 use crate::scene::{FORMAT, HEIGHT, WIDTH, set_viewport};
 use ash::vk;
 
-/// The format of depth and stencil.
-pub const DEPTH_FORMAT: vk::Format = vk::Format::D32_SFLOAT_S8_UINT;
+pub use crate::polygons::DEPTH_FORMAT;
 
 /// What passes clear colour to.
 pub const CLEAR: [f32; 4] = [0.25, 0.25, 0.25, 0.0];

@@ -4,6 +4,9 @@ use crate::gpu::Gpu;
 use crate::scene::{FORMAT, replace};
 use ash::vk;
 
+/// The format of depth and stencil.
+pub const DEPTH_FORMAT: vk::Format = vk::Format::D32_SFLOAT_S8_UINT;
+
 /// A vertex as most tests store it: a position in clip space and a colour.
 pub type Vertex = [f32; 8];
 
@@ -243,7 +246,7 @@ impl Request {
         let mut rendering = vk::PipelineRenderingCreateInfo::default()
             .color_attachment_formats(&self.formats)
             .depth_attachment_format(self.depth_format)
-            .stencil_attachment_format(if self.depth_format == crate::canvas::DEPTH_FORMAT {
+            .stencil_attachment_format(if self.depth_format == DEPTH_FORMAT {
                 self.depth_format
             } else {
                 vk::Format::UNDEFINED

@@ -156,12 +156,3 @@ impl Case {
         }
     }
 }
-
-impl Missing {
-    fn from_name(name: &str) -> Self {
-        [Self::Program, Self::Data, Self::Capability]
-            .into_iter()
-            .find(|missing| format!("{missing:?}") == name)
-            .expect("the name that this program wrote")
-    }
-}

@@ -77,6 +77,16 @@ pub fn is_long() -> bool {
     std::env::var_os("GAURAST_TEST_LONG").is_some_and(|value| value == "1")
 }
 
+impl Missing {
+    /// The kind of that name.
+    pub(crate) fn from_name(name: &str) -> Self {
+        [Self::Program, Self::Data, Self::Capability]
+            .into_iter()
+            .find(|missing| format!("{missing:?}") == name)
+            .expect("the name that this program wrote")
+    }
+}
+
 impl Need {
     /// The reason if it is missing.
     pub(crate) fn missing(self) -> Option<Ignored> {

@@ -3,7 +3,7 @@
 //! A comment names things in backticks, as C has them: `VkGaussianOrderGAURAST`, `VK_GAUSSIAN_ORDER_PER_PIXEL_GAURAST`,
 //! `VkGaussianCameraGAURAST::eye`, and members of the structure that it is about. In Rust these are links.
 
-use super::{Extension, Structure, TAG, rust_constant, rust_name};
+use super::extension::{Extension, Structure, TAG, rust_constant, rust_name};
 use crate::rust::snake_case;
 use std::fmt::Write;
 

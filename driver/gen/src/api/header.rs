@@ -1,6 +1,6 @@
 //! Writes the C header.
 
-use super::{Enum, Extension, Structure, TAG};
+use super::extension::{Enum, Extension, Structure, TAG};
 use crate::rust::snake_case;
 use std::fmt::Write;
 

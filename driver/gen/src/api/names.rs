@@ -1,6 +1,6 @@
 //! Writes what the C header must say of the Rust, as expressions of C with their values.
 
-use super::{Extension, Structure, rust_constant, rust_file, rust_name};
+use super::extension::{Extension, Structure, rust_constant, rust_file, rust_name};
 use crate::error::Error;
 use std::fmt::Write;
 

@@ -1,7 +1,7 @@
 //! Writes the extension in Rust, in the shape in which ash has the extensions that it knows.
 
 use super::comment::Comments;
-use super::{
+use super::extension::{
     Command, Enum, Extension, Member, Structure, TAG, rust_constant, rust_file, rust_name,
 };
 use crate::error::Error;
@@ -35,18 +35,16 @@ fn base_type(name: &str) -> String {
     }
 }
 
-impl Member {
-    /// Its type in Rust.
-    fn rust_type(&self) -> String {
-        let base = base_type(&self.ty);
-        if self.is_pointer {
-            let kind = if self.is_const { "const" } else { "mut" };
-            let lifetime = if self.ty.ends_with(TAG) { "<'_>" } else { "" };
-            return format!("*{kind} {base}{lifetime}");
-        }
-        let lengths = self.lengths.iter().rev();
-        lengths.fold(base, |ty, length| format!("[{ty}; {length}]"))
+/// The type of a member in Rust.
+fn rust_type(member: &Member) -> String {
+    let base = base_type(&member.ty);
+    if member.is_pointer {
+        let kind = if member.is_const { "const" } else { "mut" };
+        let lifetime = if member.ty.ends_with(TAG) { "<'_>" } else { "" };
+        return format!("*{kind} {base}{lifetime}");
     }
+    let lengths = member.lengths.iter().rev();
+    lengths.fold(base, |ty, length| format!("[{ty}; {length}]"))
 }
 
 /// The module of structures, enums, constants and function types.
@@ -113,7 +111,7 @@ pub(super) fn definitions(
 }
 
 fn declaration(member: &Member) -> String {
-    format!("{}: {},", member.rust_name(), member.rust_type())
+    format!("{}: {},", member.rust_name(), rust_type(member))
 }
 
 fn add_enum(code: &mut String, comments: Comments<'_>, of: &Enum) {
@@ -230,8 +228,8 @@ fn default_value(member: &Member) -> String {
         ("sType", ..) => "<Self as vk::TaggedStructure>::STRUCTURE_TYPE".to_owned(),
         (_, true, true) => "core::ptr::null()".to_owned(),
         (_, true, false) => "core::ptr::null_mut()".to_owned(),
-        _ if member.lengths.is_empty() => format!("{}::default()", member.rust_type()),
-        _ => format!("<{}>::default()", member.rust_type()),
+        _ if member.lengths.is_empty() => format!("{}::default()", rust_type(member)),
+        _ => format!("<{}>::default()", rust_type(member)),
     };
     format!("{}: {value},\n", member.rust_name())
 }
@@ -246,7 +244,7 @@ fn setters(structure: &Structure) -> String {
         if member.ty == "VkBool32" {
             let _ = writeln!(bools, "        {},", member.rust_name());
         } else {
-            let ty = member.rust_type();
+            let ty = rust_type(member);
             let _ = writeln!(others, "        {}: {ty},", member.rust_name());
         }
     }
@@ -400,7 +398,7 @@ fn add_command(calls: &mut String, comments: Comments<'_>, command: &Command) {
     let (mut parameters, mut arguments) = (String::new(), String::new());
     for parameter in &command.parameters {
         let name = parameter.rust_name();
-        let ty = parameter.rust_type();
+        let ty = rust_type(parameter);
         let (name, ty) = match (name.strip_prefix("p_"), ty.strip_prefix("*const ")) {
             (Some(name), Some(pointee)) => (name.to_owned(), format!("&{pointee}")),
             _ => (name, ty),

@@ -4,6 +4,7 @@
 //! All paths in the sources count (imports, expressions, types, macros' arguments), but for those of tests within a crate.
 //! An `impl` outside its type's module is an arrow back from that module, since whoever reads the type must go there;
 //! but for types in generated files, which can hold nothing by hand.
+//! `known.txt` lists the crates whose cycles are there still. It only shrinks: a crate without one must leave it.
 
 mod graph;
 mod harness;
@@ -34,6 +35,12 @@ fn names() -> Vec<Variant> {
     targets.map(|target| Variant::new(target.name)).collect()
 }
 
+/// The crates that have cycles still.
+fn known() -> impl Iterator<Item = &'static str> {
+    let lines = include_str!("known.txt").lines();
+    lines.filter(|line| !line.starts_with('#'))
+}
+
 #[gaurast_runner::test(each = names())]
 fn modules_have_no_cycle(case: &Case) {
     let targets = targets();
@@ -46,7 +53,19 @@ fn modules_have_no_cycle(case: &Case) {
         .iter()
         .map(|arrow| format!("{arrow}\n"))
         .collect();
-    assert!(found.is_empty(), "arrows in cycles:\n{found}");
+    if known().any(|name| name == target.name) {
+        assert!(!found.is_empty(), "no cycle any more: off the list with it");
+    } else {
+        assert!(found.is_empty(), "arrows in cycles:\n{found}");
+    }
+}
+
+#[gaurast_runner::test]
+fn known_crates_are_there() {
+    let targets = targets();
+    for name in known() {
+        assert!(targets.iter().any(|target| target.name == name), "{name}");
+    }
 }
 
 #[gaurast_runner::test]

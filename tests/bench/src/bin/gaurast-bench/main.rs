@@ -1,6 +1,7 @@
 //! `gaurast-bench`: run time against error, beside what a machine without a GPU offers otherwise.
 
 mod callgrind;
+mod commands;
 mod counts;
 mod frames;
 mod growth;
@@ -26,6 +27,7 @@ use gaurast_scene::SceneError;
 use gaurast_scene::{camera::CameraError, camera_files::CameraFileError};
 use thiserror::Error;
 
+use commands::{CommandsArguments, CommandsWorkerArguments};
 use counts::{CountsArguments, CountsError, WorkerArguments};
 use worker::Contender;
 use workload::{Extra, Source, Workload};
@@ -49,6 +51,8 @@ pub(crate) enum BenchError {
     Counts(#[from] CountsError),
     #[error(transparent)]
     Callgrind(#[from] callgrind::CallgrindError),
+    #[error("the driver refused a command: {0}")]
+    Refused(#[from] ash::vk::Result),
     #[error("a worker failed: {0}")]
     Worker(String),
     #[error("a worker could not be spoken to: {0}")]
@@ -90,12 +94,17 @@ enum Command {
     Optimizations(OptimizationsArguments),
     /// Holds instructions, hashes of pictures and sizes of functions against stored ones.
     Counts(CountsArguments),
+    /// Tells what recording draws and creating pipelines cost, without the device.
+    Commands(CommandsArguments),
     /// Draws for the other commands, which start it.
     #[command(hide = true)]
     Worker,
     /// Draws for `counts`, which starts it.
     #[command(hide = true)]
     CountsWorker(WorkerArguments),
+    /// Works for `commands`, which starts it.
+    #[command(hide = true)]
+    CommandsWorker(CommandsWorkerArguments),
 }
 
 /// What whole frames cost.
@@ -222,6 +231,8 @@ fn run(command: &Command) -> Result<(), BenchError> {
         Command::Counts(arguments) => Ok(counts::run(arguments)?),
         Command::Worker => worker::run(),
         Command::CountsWorker(arguments) => Ok(counts::work(arguments)?),
+        Command::Commands(arguments) => commands::run(arguments),
+        Command::CommandsWorker(arguments) => commands::work(arguments),
     }
 }
 
