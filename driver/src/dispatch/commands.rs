@@ -1236,6 +1236,7 @@ unsafe extern "system" fn vkCreateImage(
                 handle::create(crate::resource::image::create_image(
                     valid::input(p_create_info)?,
                     valid::find_in_chain::<vk::ExternalMemoryImageCreateInfo<'_>>(info.p_next),
+                    valid::find_in_chain::<vk::ImageStencilUsageCreateInfo<'_>>(info.p_next),
                 )?),
             )
             .map(|()| vk::Result::SUCCESS)

@@ -178,12 +178,11 @@ fn unsupported_format(format: vk::Format) -> Error {
 fn new_image(
     info: &vk::ImageCreateInfo<'_>,
     external: Option<&vk::ExternalMemoryImageCreateInfo<'_>>,
+    stencil: Option<&vk::ImageStencilUsageCreateInfo<'_>>,
 ) -> Result<Image, Error> {
     if external.is_some_and(|external| !external.handle_types.is_empty()) {
         return Err(Error::FeatureNotPresent("external memory".into()));
     }
-    // SAFETY: the caller's promise.
-    let stencil = unsafe { valid::find_in_chain::<vk::ImageStencilUsageCreateInfo>(info.p_next) };
     let supported = formats::image_properties(ImageQuery {
         format: info.format,
         ty: info.image_type,
@@ -237,8 +236,9 @@ fn new_image(
 pub(crate) fn create_image(
     create_info: &vk::ImageCreateInfo<'_>,
     external: Option<&vk::ExternalMemoryImageCreateInfo<'_>>,
+    stencil: Option<&vk::ImageStencilUsageCreateInfo<'_>>,
 ) -> Result<Arc<Image>, Error> {
-    new_image(create_info, external).map(Arc::new)
+    new_image(create_info, external, stencil).map(Arc::new)
 }
 
 #[doc(alias = "vkGetImageMemoryRequirements")]
@@ -261,7 +261,7 @@ pub(crate) fn get_device_image_memory_requirements(
     create_info: &vk::ImageCreateInfo<'_>,
     memory_requirements: OutputChain<'_, vk::MemoryRequirements2<'_>>,
 ) -> Result<(), Error> {
-    let image = new_image(create_info, None)?;
+    let image = new_image(create_info, None, None)?;
     fill_requirements(memory_requirements, image.requirements())
 }
 
