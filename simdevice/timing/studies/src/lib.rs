@@ -1,6 +1,7 @@
 //! Studies of the simulated GauRast hardware, on top of the timing model, which knows none of them: the paper's numbers
 //! beside the model's, sweeps over the machine's numbers, what each skip of the device would bring as hardware, area, charts,
-//! and two references that the model is held against, [`stepped`] cycle by cycle and [`pe`] operation by operation.
+//! other ways to draw Gaussians ([`simt`], [`rivals`]); and the references that the model is held against, [`stepped`] cycle by cycle,
+//! [`pe`] and [`module`] bit by bit, and [`rtl`], the module in SystemVerilog.
 #![forbid(unsafe_code)]
 
 pub mod area;
