@@ -50,9 +50,9 @@ fn run(shader: &Shader, input: impl Fn(InputSource, usize) -> u32) -> Vec<[[f32;
             panic!("{it:?}");
         };
         outputs.resize(outputs.len().max(location as usize + 1), [[0.0; 4]; LANES]);
-        for lane in 0..LANES {
-            let value = f32::from_bits(machine.output(slot, lane));
-            outputs[location as usize][lane][component as usize] = value;
+        let lanes = outputs[location as usize].iter_mut().enumerate();
+        for (lane, output) in lanes {
+            output[component as usize] = f32::from_bits(machine.output(slot, lane));
         }
     }
     outputs
@@ -105,6 +105,7 @@ fn check_chosen_inputs(shader: &Shader, own: [f32; 2]) {
         },
         other => panic!("{other:?}"),
     });
+    let output = |location: usize, lane: usize| outputs[location][lane];
     for lane in 0..LANES {
         let element = chosen(lane) as u32;
         let at = |location, component, by: [f32; 2]| {
@@ -136,7 +137,7 @@ fn check_chosen_inputs(shader: &Shader, own: [f32; 2]) {
         ];
         for (location, expected) in expected.iter().enumerate() {
             for (component, expected) in expected.iter().enumerate() {
-                let found = outputs[location][lane][component];
+                let found = output(location, lane)[component];
                 assert!(
                     (found - expected).abs() < 2e-3,
                     "output {location}.{component}, lane {lane}: {found}, not {expected}"
