@@ -535,7 +535,10 @@ fn append(
     let [keys, sequences] = &*scratch.keys;
     let keys = lanes.iter().map(|one| [keys[one.at], sequences[one.at]]);
     out.keys.extend(keys);
-    let splats = lanes.iter().map(|one| one.splat(view, scratch));
+    let splats = lanes.iter().map(
+        #[inline(always)]
+        |one| one.splat(view, scratch),
+    );
     match view.period {
         None => out.splats.extend(splats),
         Some(period) => out

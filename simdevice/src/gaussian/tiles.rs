@@ -168,12 +168,16 @@ fn find_tiles_by<S: Simd>(
         tall,
         left,
     } = found;
-    tall.for_each(|at| {
-        if let Some(reach) = reach_by_rows(view, simd, at, scratch, &mut out.spans, &mut beside) {
-            scratch.reaches.set(at, &reach);
-            reached.set_one(at, true);
-        }
-    });
+    tall.for_each(
+        #[inline(always)]
+        |at| {
+            let spans = &mut out.spans;
+            if let Some(reach) = reach_by_rows(view, simd, at, scratch, spans, &mut beside) {
+                scratch.reaches.set(at, &reach);
+                reached.set_one(at, true);
+            }
+        },
+    );
     scratch.copies.clear();
     left.for_each(|at| {
         if let Some(reach) = reach_of_one(view, at, scratch, out, &mut beside) {
