@@ -9,7 +9,7 @@ use simdevice::state::{
     ResolveMode, StencilFace, StencilOp, Topology, Viewport,
 };
 use simdevice::texture::{
-    AddressMode, BorderColor, ComponentSwizzle, Filter, IDENTITY, MipmapMode, Swizzle, Reduction,
+    AddressMode, BorderColor, ComponentSwizzle, Filter, IDENTITY, MipmapMode, Reduction, Swizzle,
 };
 use std::ffi::{CStr, c_char};
 

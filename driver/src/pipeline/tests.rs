@@ -39,7 +39,8 @@ fn binding(number: u32, kind: vk::DescriptorType, count: u32) -> BindingInfo {
 fn layout(sets: Vec<BindingInfo>) -> PipelineLayout {
     let set = |info| {
         Some(Arc::new(
-            DescriptorSetLayout::new(vec![info], vk::DescriptorSetLayoutCreateFlags::empty()).unwrap(),
+            DescriptorSetLayout::new(vec![info], vk::DescriptorSetLayoutCreateFlags::empty())
+                .unwrap(),
         ))
     };
     PipelineLayout::new(sets.into_iter().map(set).collect(), &[], 0).unwrap()

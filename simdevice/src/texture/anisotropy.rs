@@ -7,7 +7,7 @@
 use super::lod;
 use super::sampler::Sampler;
 use super::surface::Surface;
-use isa::ir::{VECTOR_LANES, Dimension};
+use isa::ir::{Dimension, VECTOR_LANES};
 use isa::resources::{LaneWords, LodRequest, SampleRequest};
 
 /// The footprints of 16 lanes.

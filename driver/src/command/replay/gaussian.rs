@@ -34,13 +34,15 @@ pub(crate) fn begin(state: &State, gaussian: &GaussianPipeline) -> Result<Vec<Pa
     }))];
     if let Some(stage) = &gaussian.resolve {
         let (sets, constants) = (&state.graphics_sets, &state.push_constants);
-        packets.push(Packet::GaussianFragmentStage(Box::new(GaussianFragmentStage {
-            program: Arc::clone(&stage.program),
-            bindings: descriptors::bindings(&stage.resources, sets, constants)?,
-            sample_shading: stage.sample_shading,
-            alpha_to_coverage: stage.alpha_to_coverage,
-            alpha_to_one: stage.alpha_to_one,
-        })));
+        packets.push(Packet::GaussianFragmentStage(Box::new(
+            GaussianFragmentStage {
+                program: Arc::clone(&stage.program),
+                bindings: descriptors::bindings(&stage.resources, sets, constants)?,
+                sample_shading: stage.sample_shading,
+                alpha_to_coverage: stage.alpha_to_coverage,
+                alpha_to_one: stage.alpha_to_one,
+            },
+        )));
     }
     Ok(packets)
 }
