@@ -216,8 +216,8 @@ fn sets_choose_the_length_of_their_last_binding() {
     // SAFETY: the create info is valid.
     unsafe {
         gpu.device()
-            .get_descriptor_set_layout_support(&info, &mut answer)
-    };
+            .get_descriptor_set_layout_support(&info, &mut answer);
+    }
     assert_eq!(answer.supported, vk::TRUE);
     assert!(support.max_variable_descriptor_count >= 64);
 

@@ -155,7 +155,7 @@ impl FromStr for Placement {
 }
 
 /// Where the scene is seen from.
-#[derive(Args, Clone)]
+#[derive(Args, Clone, Default)]
 #[command(next_help_heading = "Camera")]
 pub struct CameraArguments {
     /// A camera file: cameras.json of 3DGS, transforms.json or camera_path.json of nerfstudio, or COLMAP's folder
@@ -270,33 +270,6 @@ pub struct CameraArguments {
     /// Print the cameras as JSON, which --path reads, and draw nothing
     #[arg(long)]
     pub frame: bool,
-}
-
-impl Default for CameraArguments {
-    fn default() -> Self {
-        Self {
-            cameras: None,
-            view: Vec::new(),
-            dataparser: None,
-            undistorted: false,
-            eye: None,
-            target: None,
-            up: None,
-            azimuth: None,
-            elevation: None,
-            distance: None,
-            zoom: None,
-            orbit: None,
-            path: None,
-            frames: None,
-            model: CameraModel::default(),
-            fov: None,
-            near: None,
-            far: None,
-            size: None,
-            frame: false,
-        }
-    }
 }
 
 /// How Gaussians are drawn.

@@ -121,8 +121,8 @@ fn footprints(surface: &Surface, sampler: &Sampler, request: &SampleRequest) -> 
         let least = f32::from_bits(least) - sampler.mip_lod_bias;
         footprints.lod[lane] = lod.max(least).to_bits();
         let length = if along_x >= along_y { dx } else { dy };
-        for axis in 0..2 {
-            footprints.length[axis][lane] = length[axis];
+        for (lengths, length) in footprints.length.iter_mut().zip(length) {
+            lengths[lane] = length;
         }
     }
     footprints

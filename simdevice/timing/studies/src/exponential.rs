@@ -101,9 +101,9 @@ impl Widths {
         let low = fraction & ((1 << low_bits) - 1);
         let bend = match self.curvature {
             0 => 0,
-            bits => entry.curvature * low >> (self.fraction + bits - self.slope),
+            bits => (entry.curvature * low) >> (self.fraction + bits - self.slope),
         };
-        let rise = (entry.slope + bend) * low >> (self.fraction + self.slope - self.power);
+        let rise = ((entry.slope + bend) * low) >> (self.fraction + self.slope - self.power);
         entry.power + rise
     }
 
@@ -112,7 +112,7 @@ impl Widths {
         let mut coefficients = self.polynomial.iter().rev();
         let first = coefficients.next().copied().unwrap_or_default();
         coefficients.fold(first, |sum, coefficient| {
-            coefficient + (sum * fraction >> self.fraction)
+            coefficient + ((sum * fraction) >> self.fraction)
         })
     }
 }

@@ -61,7 +61,7 @@ fn units_compute_the_models_bits(case: &Case) {
                 }
             };
             let a = number();
-            let near = a ^ 1 << (format.bits() - 1) ^ index as u32 % 7;
+            let near = a ^ (1 << (format.bits() - 1)) ^ (index as u32 % 7);
             [a, if index % 6 == 2 { near } else { number() }]
         })
         .collect();

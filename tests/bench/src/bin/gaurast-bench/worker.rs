@@ -386,11 +386,10 @@ impl Artist {
 
     /// Draws what is asked for; if it is to `warm_up`, also before, until a frame makes no clusters.
     fn answer(&mut self, request: &Request, warm_up: bool) -> Result<Drawn, BenchError> {
-        while warm_up {
+        let mut is_cold = warm_up;
+        while is_cold {
             let before = self.draw(&request.camera, request.settings)?;
-            if describe(&before).counter(CLUSTER_TIME) == 0.0 {
-                break;
-            }
+            is_cold = describe(&before).counter(CLUSTER_TIME) != 0.0;
         }
         let frame = self.draw(&request.camera, request.settings)?;
         if let Some(path) = &request.picture {
