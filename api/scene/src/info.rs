@@ -87,9 +87,9 @@ impl Info {
                 min: *position,
                 max: *position,
             });
-            for axis in 0..3 {
-                bounds.min[axis] = bounds.min[axis].min(position[axis]);
-                bounds.max[axis] = bounds.max[axis].max(position[axis]);
+            for (axis, value) in position.iter().enumerate() {
+                bounds.min[axis] = bounds.min[axis].min(*value);
+                bounds.max[axis] = bounds.max[axis].max(*value);
             }
         }
         let numbers = shape.scale.iter().chain(&shape.rotation);

@@ -234,8 +234,11 @@ proptest! {
 /// A packer of named parts into a file.
 type Pack = fn(&[(String, Vec<u8>)]) -> Vec<u8>;
 
-/// Good files as what they pack: a name, the packer, and its parts.
-static PARTS: LazyLock<[(&str, Pack, Vec<(String, Vec<u8>)>); 5]> = LazyLock::new(|| {
+/// A file's name, its packer, and its parts.
+type Packed = (&'static str, Pack, Vec<(String, Vec<u8>)>);
+
+/// Good files as what they pack.
+static PARTS: LazyLock<[Packed; 5]> = LazyLock::new(|| {
     let (properties, rows) = distinct(1, 2);
     let spz = |degree, stride: usize| {
         let body = [
