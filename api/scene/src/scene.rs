@@ -147,8 +147,28 @@ impl Scene {
         self.join(moved);
     }
 
+    /// As [`Scene::join`], for scenes that a file may name many times.
+    ///
+    /// # Errors
+    /// If there is not enough memory.
+    pub(crate) fn try_join(&mut self, other: Self) -> Result<(), Fault> {
+        let (degree, count) = (self.sh_degree.max(other.sh_degree), other.len());
+        let stride = sh_coefficients(degree);
+        let fits = self.is_empty()
+            || self.positions.try_reserve(count).is_ok()
+                && self.shapes.try_reserve(count).is_ok()
+                && self.sh.try_reserve(count * stride).is_ok();
+        if !fits {
+            let each = size_of::<[f32; 3]>() * (1 + stride) + size_of::<GaussianShape>();
+            let bytes = (each as u64).saturating_mul((self.len() + count) as u64);
+            return Err(Reason::Memory(bytes).at(Place::File));
+        }
+        self.join(other);
+        Ok(())
+    }
+
     /// Appends `other` as it is.
-    pub(crate) fn join(&mut self, mut other: Self) {
+    fn join(&mut self, mut other: Self) {
         if self.is_empty() {
             *self = other;
             return;

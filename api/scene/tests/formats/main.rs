@@ -234,10 +234,10 @@ proptest! {
 /// A packer of named parts into a file.
 type Pack = fn(&[(String, Vec<u8>)]) -> Vec<u8>;
 
-/// A good file as what it packs: a name, the packer, and its parts.
+/// A file's name, its packer, and its parts.
 type Packed = (&'static str, Pack, Vec<(String, Vec<u8>)>);
 
-/// Good files.
+/// Good files as what they pack.
 static PARTS: LazyLock<[Packed; 5]> = LazyLock::new(|| {
     let (properties, rows) = distinct(1, 2);
     let spz = |degree, stride: usize| {

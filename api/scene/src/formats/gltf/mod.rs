@@ -219,7 +219,7 @@ impl<'a> Reader<'a> {
                 map.translation,
                 scene.sh_degree(),
             ));
-            self.scene.join(scene);
+            self.scene.try_join(scene)?;
         }
         Ok(())
     }

@@ -74,15 +74,15 @@ pub(super) fn load(meta: &[u8], origin: Origin<'_>) -> Result<Scene, Fault> {
         }
         let whole = parts.iter().map(|part| part.count).sum::<usize>() == unit.len();
         if whole {
-            scene.join(unit);
+            scene.try_join(unit)?;
         } else {
             for part in parts.iter().filter(|part| part.count > 0) {
-                scene.join(unit.range(part.offset..part.offset + part.count));
+                scene.try_join(unit.range(part.offset..part.offset + part.count))?;
             }
         }
     }
     if let Some(name) = &meta.environment {
-        scene.join(unit(name, origin)?);
+        scene.try_join(unit(name, origin)?)?;
     }
     if scene.is_empty() {
         return Err(Reason::Empty.at(Place::File));
