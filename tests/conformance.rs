@@ -4,6 +4,7 @@ mod driver;
 mod gaussian;
 mod loader;
 mod shader;
+mod simulator;
 mod stress;
 mod triangles;
 

@@ -92,6 +92,7 @@ const HEAD: &str = "
     #extension GL_EXT_buffer_reference2 : require
     layout(local_size_x = 1) in;
     layout(buffer_reference, std430, buffer_reference_align = 4) buffer Words { uint word[]; };
+    layout(buffer_reference) buffer Node;
     layout(buffer_reference, std430, buffer_reference_align = 16) buffer Node { Node next; uint value; uint pad; };
     layout(push_constant) uniform Push { Words target; Words source; Node first; };";
 

@@ -212,10 +212,6 @@ fn cameras() -> Vec<(&'static str, GaussianCameraGAURAST<'static>)> {
             camera().rotation([nan; 9]),
         ),
         (
-            "VUID-VkGaussianCameraGAURAST-rotation-orthonormal",
-            camera().rotation([0.0; 9]),
-        ),
-        (
             "VUID-VkGaussianCameraGAURAST-eye-value",
             camera().eye([f64::INFINITY; 3]),
         ),

@@ -4,15 +4,15 @@ use std::collections::HashMap;
 use std::rc::Rc;
 
 use isa::ir::{Binding, Reg, Space};
-use spirv::Decoration;
+use isa::op::Op as Ir;
+use spirv::{Decoration, StorageClass};
 
 use super::analysis::Analysis;
 use super::emitter::Emitter;
 use super::inputs_outputs::InputsOutputs;
 use super::options::Options;
-use super::pointer_value::{pointer_from_value, pointer_to_value};
 use super::promoted::PromotedVariables;
-use super::value::{MemoryRef, Pointer, TIGHT, Value};
+use super::value::{EXPLICIT, MemoryLayout, MemoryRef, Pointer, TIGHT, Value};
 use crate::error::{Result, malformed, unsupported};
 use crate::globals::Globals;
 use crate::instruction::Instruction;
@@ -192,5 +192,143 @@ impl Translator<'_> {
         let scalars: Rc<[Scalar]> = self.globals.types.flatten(ty)?.into();
         self.emit.charge_budget(scalars.len())?;
         Ok(self.promoted.add(scalars, input))
+    }
+}
+
+/// The registers of a pointer.
+fn pointer_to_value(t: &mut Translator, pointer: &Pointer) -> Result<Rc<[Reg]>> {
+    let Pointer::Memory(place) = pointer else {
+        return unsupported("this pointer as a value");
+    };
+    if place.space != Space::Global {
+        check_layout(t, place)?;
+    }
+    match place.space {
+        Space::Global => Ok([address(t, place)?].into()),
+        Space::Buffer(binding) => {
+            let slot = slot_number(t, binding);
+            Ok([slot, bytes_before(t, place, 0)].into())
+        }
+        Space::Shared => Ok([bytes_before(t, place, 1)].into()),
+        Space::PushConstants | Space::Private => unsupported("this pointer as a value"),
+    }
+}
+
+/// The pointer that registers stand for.
+fn pointer_from_value(t: &mut Translator, ty: u32, regs: &[Reg]) -> Result<Pointer> {
+    let (class, pointee) = t.globals.types.pointer(ty)?;
+    let at = |space, base, layout| {
+        Pointer::Memory(MemoryRef {
+            space,
+            base: Some(base),
+            offset: 0,
+            layout,
+            ty: pointee,
+        })
+    };
+    match (class, regs) {
+        (StorageClass::PhysicalStorageBuffer, [address]) => {
+            t.interface.uses_addresses = true;
+            Ok(at(Space::Global, *address, EXPLICIT))
+        }
+        (StorageClass::StorageBuffer, [slot, bytes]) => {
+            let layout = pointee_layout(t, pointee, EXPLICIT)?;
+            let one = t.emit.u32(1);
+            let binding = Binding {
+                slot: 0,
+                count: t.next_resource_slot,
+                index: Some(t.emit.op(Ir::ISub, &[*slot, one])),
+            };
+            Ok(at(Space::Buffer(binding), *bytes, layout))
+        }
+        (StorageClass::Workgroup, [bytes]) => {
+            let layout = pointee_layout(t, pointee, workgroup_layout(t))?;
+            let one = t.emit.u32(1);
+            let base = t.emit.op(Ir::ISub, &[*bytes, one]);
+            Ok(at(Space::Shared, base, layout))
+        }
+        _ => unsupported("this value as a pointer"),
+    }
+}
+
+/// Refuses a pointer whose type doesn't say how what it points to lies in memory.
+fn check_layout(t: &Translator, place: &MemoryRef) -> Result<()> {
+    if place.layout.component_stride.is_some() {
+        return unsupported("a variable pointer into a matrix whose rows are in order");
+    }
+    pointee_layout(t, place.ty, place.layout).map(|_| ())
+}
+
+/// The layout of what a variable pointer leads to. Only its type is known then: of a matrix, all members of its type must
+/// have one layout.
+fn pointee_layout(t: &Translator, pointee: u32, layout: MemoryLayout) -> Result<MemoryLayout> {
+    let Some(matrix) = t
+        .globals
+        .types
+        .matrix_in(pointee)
+        .filter(|_| layout.explicit)
+    else {
+        return Ok(layout);
+    };
+    match t.globals.types.matrix_layout(matrix) {
+        Some(layout_of_all) => Ok(MemoryLayout {
+            matrix: Some(layout_of_all),
+            ..layout
+        }),
+        None => unsupported("a variable pointer to a matrix that has several layouts"),
+    }
+}
+
+/// The 64-bit address of a place.
+fn address(t: &mut Translator, place: &MemoryRef) -> Result<Reg> {
+    let Some(base) = place.base else {
+        return malformed("the pointer has no address");
+    };
+    if place.offset == 0 {
+        return Ok(base);
+    }
+    let offset = t.emit.u64(u64::from(place.offset));
+    Ok(t.emit.op(Ir::IAdd64, &[base, offset]))
+}
+
+/// The number of a descriptor's slot, counted from 1; 0 if there is no such descriptor.
+fn slot_number(t: &mut Translator, binding: Binding) -> Reg {
+    let first = t.emit.u32(binding.slot + 1);
+    match binding.index {
+        None => first,
+        Some(index) => {
+            let (count, zero) = (t.emit.u32(binding.count), t.emit.u32(0));
+            let within = t.emit.op(Ir::ULt, &[index, count]);
+            let slot = t.emit.op(Ir::IAdd, &[first, index]);
+            t.emit.select(within, slot, zero)
+        }
+    }
+}
+
+/// Bytes from the start of a place's memory, and some more.
+fn bytes_before(t: &mut Translator, place: &MemoryRef, more: u32) -> Reg {
+    let constant = t.emit.u32(place.offset.saturating_add(more));
+    match place.base {
+        Some(base) => t.emit.op(Ir::IAdd, &[base, constant]),
+        None => constant,
+    }
+}
+
+/// The blocks among the entry point's workgroup variables, by their types.
+pub fn workgroup_blocks(t: &Translator) -> impl Iterator<Item = u32> {
+    let used = t.analysis.used.iter();
+    let variables = used.filter_map(|id| t.globals.variables.get(id));
+    variables
+        .filter(|it| it.class == StorageClass::Workgroup)
+        .map(|it| it.pointee)
+        .filter(|ty| t.module.has(*ty, Decoration::Block))
+}
+
+/// The layout of workgroup memory: explicit if an entry point's variables there are blocks, as then all are.
+pub fn workgroup_layout(t: &Translator) -> MemoryLayout {
+    if workgroup_blocks(t).next().is_some() {
+        EXPLICIT
+    } else {
+        TIGHT
     }
 }

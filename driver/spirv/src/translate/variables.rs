@@ -6,8 +6,8 @@ use spirv::{BuiltIn, Decoration, StorageClass};
 use super::descriptors::{descriptor, resource};
 use super::inputs_outputs::{IoLocation, is_computed};
 use super::memory::store_to;
-use super::translator::Translator;
-use super::value::{EXPLICIT, MemoryLayout, MemoryRef, Pointer, TIGHT, Value};
+use super::translator::{Translator, workgroup_blocks, workgroup_layout};
+use super::value::{EXPLICIT, MemoryRef, Pointer, TIGHT, Value};
 use crate::error::{Diagnostic, Error, Result, malformed, unsupported};
 use crate::globals::GlobalVariable;
 use crate::instruction::Instruction;
@@ -157,25 +157,6 @@ pub fn local_variable(t: &mut Translator, it: &Instruction) -> Result<()> {
         store_to(t, &pointer, &regs)?;
     }
     t.define_as(it, Value::Pointer(pointer.into()))
-}
-
-/// The blocks among the entry point's workgroup variables, by their types.
-fn workgroup_blocks(t: &Translator) -> impl Iterator<Item = u32> {
-    let used = t.analysis.used.iter();
-    let variables = used.filter_map(|id| t.globals.variables.get(id));
-    variables
-        .filter(|it| it.class == StorageClass::Workgroup)
-        .map(|it| it.pointee)
-        .filter(|ty| t.module.has(*ty, Decoration::Block))
-}
-
-/// The layout of workgroup memory: explicit if an entry point's variables there are blocks, as then all are.
-pub fn workgroup_layout(t: &Translator) -> MemoryLayout {
-    if workgroup_blocks(t).next().is_some() {
-        EXPLICIT
-    } else {
-        TIGHT
-    }
 }
 
 /// The place of the blocks in workgroup memory, which is one for all.

@@ -269,7 +269,7 @@ fn bad_input_is_one_sentence_and_exit_code_1() {
     );
     fails(
         &["render", "a.sog"],
-        "gaurast: a.sog: SOG files are not read yet",
+        "gaurast: a.sog: the file: the zip archive is damaged",
     );
     fails(
         &["render", "a.txt"],
@@ -488,7 +488,8 @@ fn counters_of_a_rendering_and_a_simulation_agree() {
             let mut cells = line.split('┆').map(|cell| cell.trim_matches(['│', ' ']));
             cells.nth(1) == Some(name)
         });
-        let row = row.unwrap_or_else(|| panic!("{name}: {table}"));
+        // A counter that is 0 has no row.
+        let Some(row) = row else { return 0.0 };
         let value = row.split('┆').next_back().unwrap_or_default();
         let digits: String = value.chars().filter(char::is_ascii_digit).collect();
         digits.parse().expect("a number")

@@ -2,9 +2,7 @@
 
 mod models;
 mod paper;
-mod rtl;
 mod sensitivity;
-mod tiles;
 mod trace;
 
 fn main() -> std::process::ExitCode {

@@ -1,12 +1,12 @@
 //! The module in SystemVerilog, under Verilator, against the model bit by bit, and its cycles against the stepped model's.
 
-use crate::tiles::{self, View};
+use super::tiles::{self, View};
 use gaurast_runner::{Case, Need, Variant, data, is_long};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use simdevice::timing::config::Config;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
-use timing::config::Config;
 use timing_studies::exponential::{Exponential, exp2};
 use timing_studies::module::{Drawn, Groups, List, Module};
 use timing_studies::number::Format;

@@ -1,7 +1,7 @@
 //! Prints the module's table of `docs/simulator.md`: tiles drawn by Verilator beside the model's, and cycles by cause.
-//! `cargo run --profile checked -p timing-studies --example rtl -- FOLDER TILES [SCENE...]`; FOLDER keeps what is built.
+//! `cargo run --profile checked -p gaurast-tests --example rtl -- FOLDER TILES [SCENE...]`; FOLDER keeps what is built.
 
-#[path = "../tests/studies/tiles.rs"]
+#[path = "../simulator/tiles.rs"]
 #[allow(dead_code, reason = "the tests use more of it")]
 mod tiles;
 

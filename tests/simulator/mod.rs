@@ -1,0 +1,4 @@
+//! The model of the rasterizer held against its hardware.
+
+mod rtl;
+mod tiles;
