@@ -89,7 +89,7 @@ impl Drop for Addressed {
 
 const HEAD: &str = "
     #extension GL_EXT_buffer_reference : require
-    #extension GL_EXT_buffer_reference2 : require
+    #extension GL_EXT_buffer_reference_uvec2 : require
     layout(local_size_x = 1) in;
     layout(buffer_reference, std430, buffer_reference_align = 4) buffer Words { uint word[]; };
     layout(buffer_reference) buffer Node;
@@ -122,7 +122,8 @@ fn buffers_are_reached_by_their_addresses() {
                  target.word[4] = sum;
                  atomicAdd(target.word[5], 7);
                  atomicAdd(target.word[5], 8);
-                 target.word[6] = (source + 1).word[0];
+                 uvec2 address = uvec2(source);
+                 target.word[6] = Words(uvec2(address.x + 4, address.y)).word[0];
              }}"
         ),
     );

@@ -388,7 +388,7 @@ mod tests {
                 let at = camera.project(position).expect("in front");
                 spread = spread.max((at[0] - 320.0).abs());
             }
-            assert!(spread > 160.0, "{size}: {spread}");
+            assert!(spread > 128.0, "{size}: {spread}");
             assert_eq!(camera.check(), Ok(()));
         }
     }
