@@ -40,6 +40,8 @@ pub enum PictureFormat {
     WebP,
     /// 32-bit float RGBA, and depths.
     Exr,
+    /// 8-bit RGB without compression: Netpbm's `P6`.
+    Ppm,
 }
 
 /// Why a picture could not be written.
@@ -70,7 +72,7 @@ pub enum OutputError {
 }
 
 /// The extensions of all formats, as messages show them.
-const EXTENSIONS: &str = ".png, .jpg, .webp or .exr";
+const EXTENSIONS: &str = ".png, .jpg, .webp, .ppm or .exr";
 
 impl PictureFormat {
     /// The format of the file `path`, by its extension.
@@ -84,6 +86,7 @@ impl PictureFormat {
             Some("jpg" | "jpeg") => Ok(Self::Jpeg),
             Some("webp") => Ok(Self::WebP),
             Some("exr") => Ok(Self::Exr),
+            Some("ppm") => Ok(Self::Ppm),
             _ => Err(OutputError::UnknownFormat {
                 path: path.to_owned(),
             }),
@@ -92,13 +95,13 @@ impl PictureFormat {
 
     /// Tells if files of this format can be transparent.
     pub fn has_alpha(self) -> bool {
-        self != Self::Jpeg
+        !matches!(self, Self::Jpeg | Self::Ppm)
     }
 
     /// Bytes of memory for each pixel that encoding takes beside the picture, at most.
     pub fn bytes_per_pixel(self) -> u64 {
         match self {
-            Self::Png | Self::Jpeg | Self::WebP => 8,
+            Self::Png | Self::Jpeg | Self::WebP | Self::Ppm => 8,
             // The channels twice: planes, then the file.
             Self::Exr => 48,
         }
@@ -276,6 +279,12 @@ pub fn encode(
             Ok(file)
         }
         PictureFormat::Exr => exr(picture, encoding).map_err(|error| error.to_string()),
+        PictureFormat::Ppm if transparent => Err("PPM files cannot be transparent".to_owned()),
+        PictureFormat::Ppm => {
+            let mut file = format!("P6\n{} {}\n255\n", picture.width, picture.height).into_bytes();
+            file.extend(rgb(picture, encoding));
+            Ok(file)
+        }
     }
 }
 

@@ -33,6 +33,7 @@ pub fn read(path: &Path) -> Result<Picture, OutputError> {
         PictureFormat::Jpeg => jpeg(file),
         PictureFormat::WebP => webp(file),
         PictureFormat::Exr => exr(file),
+        PictureFormat::Ppm => ppm(file),
     };
     picture.map_err(damaged)
 }
@@ -107,6 +108,32 @@ fn jpeg(mut file: BufReader<File>) -> Result<Picture, String> {
     Ok(picture(width as u32, height as u32, 3, of_bytes(&decoded)))
 }
 
+fn ppm(mut file: BufReader<File>) -> Result<Picture, String> {
+    use zune_ppm::zune_core::bytestream::ZCursor;
+    use zune_ppm::zune_core::result::DecodingResult;
+    let mut bytes = Vec::new();
+    file.read_to_end(&mut bytes)
+        .map_err(|error| error.to_string())?;
+    let mut decoder = zune_ppm::PPMDecoder::new(ZCursor::new(&bytes));
+    let text = |error| format!("{error:?}");
+    decoder.decode_headers().map_err(text)?;
+    let (width, height) = decoder.dimensions().ok_or("it has no size")?;
+    sized(width as u64, height as u64)?;
+    let channels = decoder
+        .colorspace()
+        .ok_or("it has no channels")?
+        .num_components();
+    let (width, height) = (width as u32, height as u32);
+    match decoder.decode().map_err(text)? {
+        DecodingResult::U8(values) => Ok(picture(width, height, channels, of_bytes(&values))),
+        DecodingResult::U16(values) => {
+            let values = values.iter().map(|value| f32::from(*value) / 65_535.0);
+            Ok(picture(width, height, channels, values))
+        }
+        _ => Err("its numbers are neither of 8 nor of 16 bits".to_owned()),
+    }
+}
+
 fn webp(file: BufReader<File>) -> Result<Picture, String> {
     let mut decoder = image_webp::WebPDecoder::new(file).map_err(|error| error.to_string())?;
     let (width, height) = decoder.dimensions();
@@ -151,7 +178,7 @@ mod tests {
     #[test]
     fn what_is_no_picture_is_one_sentence() {
         let folder = tempfile::tempdir().expect("a folder");
-        for name in ["a.png", "a.jpg", "a.webp", "a.exr"] {
+        for name in ["a.png", "a.jpg", "a.webp", "a.exr", "a.ppm"] {
             let path = folder.path().join(name);
             let missing = read(&path).expect_err("it is missing");
             assert!(matches!(missing, OutputError::Io { .. }), "{missing}");

@@ -9,6 +9,7 @@ use gaurast_scene::{MAX_SH_DEGREE, Transform};
 use glam::{DQuat, DVec3};
 
 use crate::compare::CompareArguments;
+use crate::compare_drivers::CompareDriversArguments;
 use crate::info::InfoArguments;
 use crate::sheet::ViewsArguments;
 use crate::simulate::SimulateArguments;
@@ -36,6 +37,8 @@ pub enum Command {
     Views(Box<ViewsArguments>),
     /// Tells how much two pictures, two folders of pictures, or a picture and a scene differ
     Compare(Box<CompareArguments>),
+    /// Runs a program on this driver and on another one, and tells how much its pictures differ
+    CompareDrivers(Box<CompareDriversArguments>),
     /// Tells what a scene holds
     Info(Box<InfoArguments>),
     /// Tells what the simulated hardware would have spent on a scene: time, energy, area

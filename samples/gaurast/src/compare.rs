@@ -74,7 +74,7 @@ impl Error {
     Folders are compared file by file, by their names without extensions."
 )]
 pub struct CompareArguments {
-    /// A picture, or a folder of pictures: .png, .jpg, .webp or .exr
+    /// A picture, or a folder of pictures: .png, .jpg, .webp, .ppm or .exr
     pub a: PathBuf,
 
     /// The reference: a picture, a folder of pictures, or a scene that is drawn for it
@@ -186,7 +186,8 @@ pub fn run(arguments: &CompareArguments) -> Result<(), Error> {
     Ok(())
 }
 
-fn check_sizes(a: &Picture, path: &Path, b: &Picture, other: &Path) -> Result<(), Error> {
+/// Checks that two pictures have one size.
+pub fn check_sizes(a: &Picture, path: &Path, b: &Picture, other: &Path) -> Result<(), Error> {
     if (a.width, a.height) == (b.width, b.height) {
         return Ok(());
     }
@@ -291,7 +292,7 @@ fn pictures(folder: &Path) -> Result<BTreeMap<String, PathBuf>, Error> {
 }
 
 /// Names, and the files of both folders.
-fn pairs(a: &Path, b: &Path) -> Result<Vec<(String, PathBuf, PathBuf)>, Error> {
+pub fn pairs(a: &Path, b: &Path) -> Result<Vec<(String, PathBuf, PathBuf)>, Error> {
     if !b.is_dir() {
         return Err(Error::Folder {
             folder: a.to_owned(),

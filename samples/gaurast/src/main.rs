@@ -3,6 +3,7 @@
 mod args;
 mod cameras;
 mod compare;
+mod compare_drivers;
 mod drawing;
 mod heatmap;
 mod info;
@@ -83,6 +84,9 @@ fn run(command: Command) -> Result<(), Failure> {
         }
         Command::Compare(arguments) => {
             compare::run(&arguments).map_err(|error| failure(error.to_string(), error.is_misuse()))
+        }
+        Command::CompareDrivers(arguments) => {
+            compare_drivers::run(&arguments).map_err(|error| failure(error.to_string(), false))
         }
         Command::Info(arguments) => {
             info::run(&arguments).map_err(|error| failure(error.to_string(), false))

@@ -551,6 +551,96 @@ fn a_training_folder_is_a_scene_with_cameras() {
     assert!(share > 0.02, "{share}");
 }
 
+/// A program that draws a picture of 3x1 pixels by the driver that it is told of: they differ in one channel of one.
+#[cfg(unix)]
+const DRAWS: &str = "case $VK_DRIVER_FILES in *other*) blue=c;; *) blue=b;; esac\nprintf 'P6\\n3 1\\n255\\naaaaa%saaa' $blue";
+
+#[cfg(unix)]
+#[gaurast_runner::test]
+fn a_programs_pictures_on_two_drivers_are_compared() {
+    let folder = folder();
+    for name in ["gaurast_icd.json", "other_icd.json"] {
+        std::fs::write(folder.path().join(name), "{}").expect("written");
+    }
+    let drivers = ["--driver", "gaurast_icd.json", "--with", "other_icd.json"];
+    let compare = |more: &[&str], script: &str, last: &[&str]| {
+        let words = ["compare-drivers"]
+            .iter()
+            .chain(&drivers)
+            .chain(more)
+            .chain(&["--", "sh", "-c", script])
+            .chain(last)
+            .copied()
+            .collect::<Vec<_>>();
+        gaurast(folder.path(), &words)
+    };
+    // In a folder of its own for each driver.
+    let output = compare(&["--json"], &format!("{DRAWS} > a.ppm"), &[]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let json: serde_json::Value = serde_json::from_str(text(&output.stdout)).expect("JSON");
+    let picture = &json["pictures"][0];
+    assert_eq!(picture["name"], "a");
+    assert_eq!(picture["equal"], false);
+    assert_eq!(picture["differing_pixels"], 1);
+    assert_eq!(picture["differing_on_edges"], 0);
+    let largest = picture["largest"].as_f64().expect("a number");
+    assert!((largest - 1.0).abs() < 1e-4, "{largest}");
+    let page = folder.path().join("compared-drivers/index.html");
+    let page = std::fs::read_to_string(page).expect("a page");
+    for source in [
+        "shown/a-gaurast.png",
+        "shown/a-other_icd.png",
+        "differences/a.png",
+    ] {
+        assert!(page.contains(source), "{page}");
+        let picture = folder.path().join("compared-drivers").join(source);
+        assert_eq!(image::image_dimensions(picture).expect("a picture"), (3, 1));
+    }
+    // Where the caller is, told of the folder by an argument; a difference above the limit fails.
+    let script = format!("test -e two.ply && {DRAWS} > $0/a.ppm");
+    let allowed = |steps: &str| {
+        let more = ["--out", steps, "--fail-above", steps];
+        compare(&more, &script, &["{}"])
+    };
+    assert!(allowed("1.5").status.success());
+    let output = allowed("0.5");
+    assert_eq!(output.status.code(), Some(1));
+    let said = text(&output.stderr);
+    assert!(
+        said.contains("1.0 steps of 255, and 0.5 are allowed"),
+        "{said}"
+    );
+    // A folder that holds something; a program that fails; a driver that isn't there.
+    for (output, sentence) in [
+        (compare(&[], "true", &[]), "--force writes into it"),
+        (
+            compare(&["--out", "b"], "exit 3", &[]),
+            "on gaurast it ended with exit status: 3",
+        ),
+        (
+            gaurast(
+                folder.path(),
+                &[
+                    "compare-drivers",
+                    "--driver",
+                    "other_icd.json",
+                    "--with",
+                    "nothing",
+                    "--out",
+                    "c",
+                    "--",
+                    "true",
+                ],
+            ),
+            "no manifest of such a driver",
+        ),
+    ] {
+        assert_eq!(output.status.code(), Some(1));
+        let said = text(&output.stderr);
+        assert!(said.contains(sentence), "{said}");
+    }
+}
+
 #[gaurast_runner::test]
 fn a_sheet_shows_eight_sides() {
     let folder = folder();
