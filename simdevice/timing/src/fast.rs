@@ -10,7 +10,8 @@ use crate::config::{Config, Rasterizer};
 use crate::plan::{self, Part, Rates, Task};
 use crate::raster::RasterReport;
 use crate::work::{FrameWork, Mode, Segment};
-use std::collections::VecDeque;
+use std::cmp::Reverse;
+use std::collections::{BinaryHeap, VecDeque};
 
 /// A tile in a module, from the first primitive that is evaluated to the last.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,31 +49,11 @@ pub fn rasterize_tiles(
     for module in &mut modules {
         module.proceed(&mut queue, raster, &mut report);
     }
-    let mut now = 0.0;
-    loop {
-        let asking = modules.iter().filter(|module| module.asks()).count();
-        let share = rates.port.min(rates.memory / asking.max(1) as f64);
-        let next = modules
-            .iter()
-            .map(|module| module.next_event(share))
-            .fold(f64::INFINITY, f64::min);
-        if !next.is_finite() {
-            break;
-        }
-        now += next;
-        for module in &mut modules {
-            module.advance(next, share);
-            // Steps of no length follow at once.
-            while module.is_done() {
-                module.proceed(&mut queue, raster, &mut report);
-            }
-            // A tile may end while the next batch is still on its way.
-            if module.step.is_some_and(|step| step.cycles <= 0.0) {
-                let write = module.end_tile(raster, &mut report);
-                module.port.extend(write);
-            }
-        }
-    }
+    let now = if contended {
+        together(&mut modules, &mut queue, raster, &mut report)
+    } else {
+        apart(&mut modules, &mut queue, raster, &mut report)
+    };
     report.cycles = now;
     // Steps wait for memory for as long as they last beyond their evaluation.
     let evaluation = report.modules.total();
@@ -85,6 +66,65 @@ pub fn rasterize_tiles(
     };
     let spans = modules.into_iter().enumerate().flat_map(spans).collect();
     (report, spans)
+}
+
+/// Lets modules that share main memory work until the queue is empty, and tells the cycles of it: at each event, all
+/// shares may change.
+fn together<'a>(
+    modules: &mut [Module],
+    queue: &mut impl Iterator<Item = &'a Task>,
+    raster: &Rasterizer,
+    report: &mut RasterReport,
+) -> f64 {
+    let mut now = 0.0;
+    loop {
+        let asking = modules.iter().filter(|module| module.asks()).count();
+        let Some(rates) = modules.first().map(|module| module.rates) else {
+            return now;
+        };
+        let share = rates.port.min(rates.memory / asking.max(1) as f64);
+        let next = modules
+            .iter()
+            .map(|module| module.next_event(share))
+            .fold(f64::INFINITY, f64::min);
+        if !next.is_finite() {
+            return now;
+        }
+        now += next;
+        for module in modules.iter_mut() {
+            module.advance(next, share);
+            module.settle(queue, raster, report);
+        }
+    }
+}
+
+/// The same for modules that never wait for each other: each goes from event to event alone, and tiles are claimed in
+/// the order of time.
+fn apart<'a>(
+    modules: &mut [Module],
+    queue: &mut impl Iterator<Item = &'a Task>,
+    raster: &Rasterizer,
+    report: &mut RasterReport,
+) -> f64 {
+    // Times are not negative, and so in the order of their bits.
+    let event = |index: usize, module: &Module| {
+        let next = module.now + module.next_event(module.rates.port);
+        next.is_finite().then(|| Reverse((next.to_bits(), index)))
+    };
+    let first = modules.iter().enumerate();
+    let mut events: BinaryHeap<_> = first
+        .filter_map(|(index, module)| event(index, module))
+        .collect();
+    let mut now = 0.0;
+    while let Some(Reverse((time, index))) = events.pop() {
+        now = f64::from_bits(time);
+        let module = &mut modules[index];
+        module.advance(now - module.now, module.rates.port);
+        module.now = now;
+        module.settle(queue, raster, report);
+        events.extend(event(index, module));
+    }
+    now
 }
 
 /// What is left of a module's step, its port apart.
@@ -220,6 +260,24 @@ impl Module {
             if request.bytes <= SLACK {
                 self.port.pop_front();
             }
+        }
+    }
+
+    /// Does what follows at once where a step or a tile has ended.
+    fn settle<'a>(
+        &mut self,
+        queue: &mut impl Iterator<Item = &'a Task>,
+        raster: &Rasterizer,
+        report: &mut RasterReport,
+    ) {
+        // Steps of no length follow at once.
+        while self.is_done() {
+            self.proceed(queue, raster, report);
+        }
+        // A tile may end while the next batch is still on its way.
+        if self.step.is_some_and(|step| step.cycles <= 0.0) {
+            let write = self.end_tile(raster, report);
+            self.port.extend(write);
         }
     }
 
