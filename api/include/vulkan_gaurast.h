@@ -2,7 +2,7 @@
 #define VULKAN_GAURAST_H_ 1
 
 /*
-** VK_GAURAST_gaussian_primitive_topology, revision 1: a 3D Gaussian is a primitive.
+** VK_GAURAST_gaussian_primitive_topology, revision 2: a 3D Gaussian is a primitive.
 **
 ** Include after <vulkan/vulkan.h>, or let this file do it. C11 and C++17. The meaning of every name is in
 ** spec/VK_GAURAST_gaussian_primitive_topology.adoc; the extension is not registered with Khronos.
@@ -19,7 +19,7 @@ extern "C" {
 #endif
 
 #define VK_GAURAST_gaussian_primitive_topology 1
-#define VK_GAURAST_GAUSSIAN_PRIMITIVE_TOPOLOGY_SPEC_VERSION 1
+#define VK_GAURAST_GAUSSIAN_PRIMITIVE_TOPOLOGY_SPEC_VERSION 2
 #define VK_GAURAST_GAUSSIAN_PRIMITIVE_TOPOLOGY_EXTENSION_NAME "VK_GAURAST_gaussian_primitive_topology"
 
 /* A location that the pipeline does not use. */
@@ -113,6 +113,7 @@ typedef struct VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST {
     VkBool32           gaussianDepthStencil;
     VkBool32           gaussianMultisample;
     VkBool32           gaussianApproximation;
+    VkBool32           gaussianMultiview;
 } VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST;
 
 typedef struct VkPhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST {
@@ -170,6 +171,7 @@ typedef struct VkPipelineGaussianStateCreateInfoGAURAST {
     VkGaussianCameraSourceGAURAST                cameraSource;
     uint32_t                                     cameraSet;
     uint32_t                                     cameraBinding;
+    uint32_t                                     cameraCount;
 } VkPipelineGaussianStateCreateInfoGAURAST;
 
 typedef struct VkPipelineGaussianApproximationStateCreateInfoGAURAST {
@@ -182,14 +184,14 @@ typedef struct VkPipelineGaussianApproximationStateCreateInfoGAURAST {
 typedef struct VkGaussianCameraGAURAST {
     VkStructureType                 sType;
     const void*                     pNext;
+    double                          eye[3];
     VkGaussianCameraModelGAURAST    model;
     float                           rotation[9];
-    double                          eye[3];
     float                           focalLength[2];
     float                           principalPoint[2];
+    float                           depthCoefficients[2];
     float                           nearPlane;
     float                           farPlane;
-    float                           depthCoefficients[2];
 } VkGaussianCameraGAURAST;
 
 typedef struct VkGaussianCameraDataGAURAST {
@@ -202,15 +204,17 @@ typedef struct VkGaussianCameraDataGAURAST {
     float                           depthCoefficients[2];
     float                           nearPlane;
     float                           farPlane;
+    uint32_t                        padding[4];
 } VkGaussianCameraDataGAURAST;
 
-typedef void (VKAPI_PTR *PFN_vkCmdSetGaussianCameraGAURAST)(VkCommandBuffer commandBuffer, const VkGaussianCameraGAURAST* pCamera);
+typedef void (VKAPI_PTR *PFN_vkCmdSetGaussianCamerasGAURAST)(VkCommandBuffer commandBuffer, uint32_t cameraCount, const VkGaussianCameraGAURAST* pCameras);
 
 #ifndef VK_NO_PROTOTYPES
 /* Not exported by the loader: get it with vkGetDeviceProcAddr. */
-VKAPI_ATTR void VKAPI_CALL vkCmdSetGaussianCameraGAURAST(
+VKAPI_ATTR void VKAPI_CALL vkCmdSetGaussianCamerasGAURAST(
     VkCommandBuffer                             commandBuffer,
-    const VkGaussianCameraGAURAST*              pCamera);
+    uint32_t                                    cameraCount,
+    const VkGaussianCameraGAURAST*              pCameras);
 #endif
 
 #ifdef __cplusplus

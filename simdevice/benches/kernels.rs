@@ -134,6 +134,7 @@ fn begin(degree: u32) -> GaussianBegin {
             sh_degree: degree,
             ..GaussianState::default()
         }),
+        further_cameras: Vec::new(),
         camera: Camera {
             model: CameraModel::Pinhole,
             rotation: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],

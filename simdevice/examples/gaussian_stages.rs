@@ -196,6 +196,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             },
             ..GaussianState::default()
         }),
+        further_cameras: Vec::new(),
         camera: Camera {
             model: CameraModel::Pinhole,
             rotation: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],

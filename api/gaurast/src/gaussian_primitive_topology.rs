@@ -9,13 +9,13 @@ use core::ffi::{CStr, c_void};
 use ash::vk;
 
 use crate::ash_compat;
-use crate::vk::{GaussianCameraGAURAST, PFN_vkCmdSetGaussianCameraGAURAST};
+use crate::vk::{GaussianCameraGAURAST, PFN_vkCmdSetGaussianCamerasGAURAST};
 
 /// The extension's name, for `ppEnabledExtensionNames`.
 pub const NAME: &CStr = c"VK_GAURAST_gaussian_primitive_topology";
 
 /// The revision of the extension that this crate describes.
-pub const SPEC_VERSION: u32 = 1;
+pub const SPEC_VERSION: u32 = 2;
 
 /// The extension number, which fixes the block of enum values: 1000000000 + (number - 1) * 1000.
 ///
@@ -52,33 +52,42 @@ impl Device {
         self.handle
     }
 
-    /// Sets the camera of the Gaussian draws that follow in the command buffer, for pipelines
+    /// Sets the cameras of the Gaussian draws that follow in the command buffer, for pipelines
     /// whose camera source is
     /// [`GaussianCameraSourceGAURAST::COMMAND`](crate::vk::GaussianCameraSourceGAURAST::COMMAND).
-    /// The camera is command buffer state: undefined when recording begins, kept when another
-    /// pipeline is bound, and not inherited by secondary command buffers. It is copied.
+    /// With one camera all views see through it; with more, view i of a pass with views sees
+    /// through camera i, and a pass without views through camera 0. Cameras are command buffer
+    /// state: undefined when recording begins, kept when another pipeline is bound, and not
+    /// inherited by secondary command buffers. They are copied, and those that were set before are
+    /// no longer there.
     ///
     /// # Safety
     ///
-    /// The valid usage of `vkCmdSetGaussianCameraGAURAST`, which the extension's specification states: handles belong to
+    /// The valid usage of `vkCmdSetGaussianCamerasGAURAST`, which the extension's specification states: handles belong to
     /// [`Self::device`], access to them is synchronised, and structures and their `p_next` chains are valid.
-    #[doc(alias = "vkCmdSetGaussianCameraGAURAST")]
+    #[doc(alias = "vkCmdSetGaussianCamerasGAURAST")]
     #[inline]
-    pub unsafe fn cmd_set_gaussian_camera(
+    pub unsafe fn cmd_set_gaussian_cameras(
         &self,
         command_buffer: vk::CommandBuffer,
-        camera: &GaussianCameraGAURAST<'_>,
+        cameras: &[GaussianCameraGAURAST<'_>],
     ) {
         // SAFETY: the caller keeps the function's contract; references are live.
-        unsafe { (self.fp.cmd_set_gaussian_camera_gaurast)(command_buffer, camera) }
+        unsafe {
+            (self.fp.cmd_set_gaussian_cameras_gaurast)(
+                command_buffer,
+                cameras.len() as u32,
+                cameras.as_ptr(),
+            )
+        }
     }
 }
 
 /// Raw VK_GAURAST_gaussian_primitive_topology device-level function pointers.
 #[derive(Clone)]
 pub struct DeviceFn {
-    /// `vkCmdSetGaussianCameraGAURAST`.
-    pub cmd_set_gaussian_camera_gaurast: PFN_vkCmdSetGaussianCameraGAURAST,
+    /// `vkCmdSetGaussianCamerasGAURAST`.
+    pub cmd_set_gaussian_cameras_gaurast: PFN_vkCmdSetGaussianCamerasGAURAST,
 }
 
 impl DeviceFn {
@@ -88,20 +97,21 @@ impl DeviceFn {
     /// What `load` returns must be null or the function of that name.
     pub fn load<F: FnMut(&CStr) -> *const c_void>(mut load: F) -> Self {
         Self {
-            cmd_set_gaussian_camera_gaurast: {
-                unsafe extern "system" fn cmd_set_gaussian_camera_gaurast(
+            cmd_set_gaussian_cameras_gaurast: {
+                unsafe extern "system" fn cmd_set_gaussian_cameras_gaurast(
                     _command_buffer: vk::CommandBuffer,
-                    _p_camera: *const GaussianCameraGAURAST<'_>,
+                    _camera_count: u32,
+                    _p_cameras: *const GaussianCameraGAURAST<'_>,
                 ) {
-                    panic!("Unable to load cmd_set_gaussian_camera_gaurast")
+                    panic!("Unable to load cmd_set_gaussian_cameras_gaurast")
                 }
-                let function = load(c"vkCmdSetGaussianCameraGAURAST");
+                let function = load(c"vkCmdSetGaussianCamerasGAURAST");
                 if function.is_null() {
-                    cmd_set_gaussian_camera_gaurast
+                    cmd_set_gaussian_cameras_gaurast
                 } else {
                     // SAFETY: the loader returns the function of that name, which has this type.
                     unsafe {
-                        core::mem::transmute::<*const c_void, PFN_vkCmdSetGaussianCameraGAURAST>(
+                        core::mem::transmute::<*const c_void, PFN_vkCmdSetGaussianCamerasGAURAST>(
                             function,
                         )
                     }

@@ -70,8 +70,8 @@ pub(crate) enum Command {
     },
     /// Any other `vkCmdSet...` of fixed-function state.
     SetDynamicState(DynamicState),
-    /// `vkCmdSetGaussianCameraGAURAST`.
-    SetCamera(Box<Camera>),
+    /// `vkCmdSetGaussianCamerasGAURAST`.
+    SetCameras(Box<[Camera]>),
     /// `vkCmdDraw` and `vkCmdDrawIndexed`.
     Draw(DrawParameters),
     /// `vkCmdDrawIndirect`, `vkCmdDrawIndexedIndirect` and their forms with a count: the draws are read when they

@@ -307,7 +307,7 @@ static ROWS: &[Command] = rows! {
         vkGetPhysicalDeviceToolPropertiesEXT: vk::PFN_vkGetPhysicalDeviceToolProperties = vkGetPhysicalDeviceToolProperties;
     }
     Device, DeviceExtension(&[c"VK_GAURAST_gaussian_primitive_topology"]) => {
-        vkCmdSetGaussianCameraGAURAST: gaurast::vk::PFN_vkCmdSetGaussianCameraGAURAST = vkCmdSetGaussianCameraGAURAST;
+        vkCmdSetGaussianCamerasGAURAST: gaurast::vk::PFN_vkCmdSetGaussianCamerasGAURAST = vkCmdSetGaussianCamerasGAURAST;
     }
     Device, DeviceExtension(&[c"VK_KHR_bind_memory2"]) => {
         vkBindBufferMemory2KHR: vk::PFN_vkBindBufferMemory2 = vkBindBufferMemory2;
@@ -4477,20 +4477,21 @@ unsafe extern "system" fn vkCmdSetLogicOpEXT(command_buffer: vk::CommandBuffer, 
     })
 }
 
-unsafe extern "system" fn vkCmdSetGaussianCameraGAURAST(
+unsafe extern "system" fn vkCmdSetGaussianCamerasGAURAST(
     command_buffer: vk::CommandBuffer,
-    p_camera: *const gaurast::vk::GaussianCameraGAURAST<'_>,
+    camera_count: u32,
+    p_cameras: *const gaurast::vk::GaussianCameraGAURAST<'_>,
 ) {
-    guard(command_buffer, "vkCmdSetGaussianCameraGAURAST", || {
+    guard(command_buffer, "vkCmdSetGaussianCamerasGAURAST", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(
                 command_buffer,
-                "vkCmdSetGaussianCameraGAURAST",
+                "vkCmdSetGaussianCamerasGAURAST",
                 |recorder| {
-                    crate::command::camera::cmd_set_gaussian_camera(
+                    crate::command::camera::cmd_set_gaussian_cameras(
                         recorder,
-                        valid::input(p_camera)?,
+                        valid::slice(p_cameras, camera_count)?,
                     )
                 },
             )

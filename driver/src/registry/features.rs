@@ -346,6 +346,8 @@ pub(crate) struct Features {
     pub(crate) gaussian_multisample: bool,
     /// `gaussianApproximation`.
     pub(crate) gaussian_approximation: bool,
+    /// `gaussianMultiview`.
+    pub(crate) gaussian_multiview: bool,
     /// `performanceCounterQueryPools`.
     pub(crate) performance_counter_query_pools: bool,
     /// `performanceCounterMultipleQueryPools`.
@@ -500,6 +502,7 @@ pub(crate) const SUPPORTED: Features = Features {
     gaussian_depth_stencil: true,
     gaussian_multisample: true,
     gaussian_approximation: true,
+    gaussian_multiview: true,
     performance_counter_query_pools: true,
     workgroup_memory_explicit_layout: true,
     workgroup_memory_explicit_layout_scalar_block_layout: true,
@@ -679,6 +682,7 @@ impl Features {
         gaussian_depth_stencil: false,
         gaussian_multisample: false,
         gaussian_approximation: false,
+        gaussian_multiview: false,
         performance_counter_query_pools: false,
         performance_counter_multiple_query_pools: false,
         workgroup_memory_explicit_layout: false,
@@ -688,7 +692,7 @@ impl Features {
     };
 
     /// The features by their names in Rust.
-    pub(crate) fn list(&self) -> [(&'static str, bool); 174] {
+    pub(crate) fn list(&self) -> [(&'static str, bool); 175] {
         [
             ("robust_buffer_access", self.robust_buffer_access),
             ("full_draw_index_uint32", self.full_draw_index_uint32),
@@ -1059,6 +1063,7 @@ impl Features {
             ("gaussian_depth_stencil", self.gaussian_depth_stencil),
             ("gaussian_multisample", self.gaussian_multisample),
             ("gaussian_approximation", self.gaussian_approximation),
+            ("gaussian_multiview", self.gaussian_multiview),
             (
                 "performance_counter_query_pools",
                 self.performance_counter_query_pools,
@@ -1611,6 +1616,7 @@ impl Features {
             out.gaussian_depth_stencil = self.gaussian_depth_stencil.into();
             out.gaussian_multisample = self.gaussian_multisample.into();
             out.gaussian_approximation = self.gaussian_approximation.into();
+            out.gaussian_multiview = self.gaussian_multiview.into();
         }
         if let Some(out) = structure.cast::<vk::PhysicalDevicePerformanceQueryFeaturesKHR<'_>>() {
             out.performance_counter_query_pools = self.performance_counter_query_pools.into();
@@ -2071,6 +2077,7 @@ impl Features {
             self.gaussian_depth_stencil |= requested.gaussian_depth_stencil != vk::FALSE;
             self.gaussian_multisample |= requested.gaussian_multisample != vk::FALSE;
             self.gaussian_approximation |= requested.gaussian_approximation != vk::FALSE;
+            self.gaussian_multiview |= requested.gaussian_multiview != vk::FALSE;
         }
         if let Some(requested) =
             valid::cast::<vk::PhysicalDevicePerformanceQueryFeaturesKHR<'_>>(structure)

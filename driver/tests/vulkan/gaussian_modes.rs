@@ -91,7 +91,7 @@ fn anything_else_between_draws_ends_the_set() {
     let look = halves(&scene, |_, commands| {
         let gaussian = &scene.gpu.gaussian;
         // SAFETY: see the crate.
-        unsafe { gaussian.cmd_set_gaussian_camera(commands, &camera()) };
+        unsafe { gaussian.cmd_set_gaussian_cameras(commands, &[camera()]) };
     });
     assert!(look == two_sets);
     // The end of a pass, and of the commands, ends it too.
@@ -233,7 +233,7 @@ fn the_camera_may_come_from_a_uniform_buffer() {
         let expected = by_command.draw([0.0; 4], |device, commands| {
             // SAFETY: see the crate.
             unsafe {
-                (by_command.gpu.gaussian).cmd_set_gaussian_camera(commands, &camera);
+                (by_command.gpu.gaussian).cmd_set_gaussian_cameras(commands, &[camera]);
                 device.cmd_draw(commands, 16, 1, 0, 0);
             }
         });

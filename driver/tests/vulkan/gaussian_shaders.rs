@@ -230,7 +230,7 @@ impl Stage {
                 unsafe {
                     device.cmd_bind_pipeline(commands, point, pipeline);
                     device.cmd_bind_vertex_buffers(commands, 0, &buffers, &[0, 0]);
-                    gpu.gaussian.cmd_set_gaussian_camera(commands, &camera());
+                    gpu.gaussian.cmd_set_gaussian_cameras(commands, &[camera()]);
                 }
                 self.bind(device, commands);
                 record(device, commands);

@@ -179,7 +179,8 @@ impl Gpu {
                 device.cmd_bind_pipeline(c, point, gaussians);
                 device.cmd_set_viewport(c, 0, &[viewport(picture, [0.0, 1.0])]);
                 device.cmd_bind_vertex_buffers(c, 0, &[splats, instances], &[0; 2]);
-                self.extension.cmd_set_gaussian_camera(c, &picture.camera);
+                self.extension
+                    .cmd_set_gaussian_cameras(c, &[picture.camera]);
                 let [fx, fy] = picture.camera.focal_length;
                 let [width, height] = picture.size.map(|side| side as f32);
                 let (vertex, constants) = (vk::ShaderStageFlags::VERTEX, [width, height, fx, fy]);

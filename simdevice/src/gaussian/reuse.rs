@@ -2,7 +2,8 @@
 //! projected, sorted and binned.
 //!
 //! A set lives in the memory of the positions that it was made from, like clusters: it is gone when that is freed or
-//! written. A buffer has one, that of its last picture, which goes before another is made, so that there are never two.
+//! written. A buffer has one for each view, that of its last picture, which goes before another is made, so that there are
+//! never two.
 
 use super::attributes::{SourceFingerprint, is_device_local};
 use super::clusters::Clusters;
@@ -27,6 +28,8 @@ pub(super) struct Key {
     camera: Camera,
     viewport: Viewport,
     bounds: Rect,
+    /// The view, of which each has a set of its own.
+    layer: u32,
     /// The depth attachment's format, if centres have depths.
     depth: Option<Format>,
     /// Whether a fragment program makes the colours, which what is hidden depends on.
@@ -78,6 +81,7 @@ impl Key {
             camera: begin.camera,
             viewport: begin.viewport,
             bounds: set.bounds,
+            layer: set.layer,
             depth: set.depth.as_ref().map(|_| set.depth_format),
             is_resolved: set.resolve.is_some(),
         })
@@ -89,7 +93,8 @@ impl Key {
         };
         let view = |key: &Self| {
             let depths = (key.depth, key.is_resolved);
-            (key.camera, key.viewport, key.bounds, depths)
+            let place = (key.bounds, key.layer);
+            (key.camera, key.viewport, place, depths)
         };
         view(self) == view(other)
             && self.state == other.state
@@ -103,10 +108,10 @@ impl Key {
         self.ranges == other.ranges && clusters.all(|(a, b)| a.ptr_eq(b))
     }
 
-    /// Whether both draw the same buffer first.
+    /// Whether both draw the same buffer first, for the same view.
     fn is_of_same_buffer(&self, other: &Self) -> bool {
         let mut first = self.streams.iter().zip(&other.streams).take(1);
-        first.all(|(a, b)| a.is_same_buffer(b))
+        self.layer == other.layer && first.all(|(a, b)| a.is_same_buffer(b))
     }
 }
 

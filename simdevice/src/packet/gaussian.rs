@@ -12,8 +12,11 @@ use std::sync::Arc;
 pub struct GaussianBegin {
     /// What the pipeline fixes.
     pub state: Arc<GaussianState>,
-    /// The camera, which means nothing to what a vertex program projects.
+    /// The camera, which means nothing to what a vertex program projects. In a pass with views it is that of the first
+    /// one, and of all without one of their own.
     pub camera: Camera,
+    /// The cameras of the other views of the pass, in their order.
+    pub further_cameras: Vec<Camera>,
     /// The viewport; its width and height are the W and H of the projection.
     pub viewport: Viewport,
     /// Pixels outside are not touched.

@@ -150,6 +150,7 @@ pub fn begin(blend: BlendState) -> GaussianBegin {
             blend_constants: [0.5, 0.25, 0.75, 0.5],
             ..GaussianState::default()
         }),
+        further_cameras: Vec::new(),
         camera: Camera {
             model: CameraModel::Pinhole,
             rotation: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],

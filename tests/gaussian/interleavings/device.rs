@@ -483,6 +483,7 @@ fn gaussians(
             blend: vec![blend(true)],
             ..GaussianState::default()
         }),
+        further_cameras: Vec::new(),
         camera: Camera {
             model: CameraModel::Pinhole,
             rotation: camera.rotation,

@@ -385,6 +385,7 @@ impl Case<'_> {
         packets.push(Packet::GaussianBegin(Box::new(GaussianBegin {
             state: Arc::new(self.state()),
             camera,
+            further_cameras: Vec::new(),
             viewport: Viewport {
                 x: 0.0,
                 y: 0.0,

@@ -102,7 +102,7 @@ impl<'a> Commands<'a> {
             device.cmd_bind_pipeline(self.raw, bind_point, pipeline.raw);
             device.cmd_bind_vertex_buffers(self.raw, 0, &buffers, &[0; 5]);
             let gaussian = self.context.gaussian();
-            gaussian.cmd_set_gaussian_camera(self.raw, camera);
+            gaussian.cmd_set_gaussian_cameras(self.raw, &[*camera]);
         }
     }
 

@@ -500,6 +500,7 @@ fn begin(bytes: &mut Bytes<'_>) -> Packet {
     let rotation = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0f32];
     Packet::GaussianBegin(Box::new(GaussianBegin {
         state: Arc::new(state),
+        further_cameras: Vec::new(),
         camera: Camera {
             model: bytes.one(&[
                 CameraModel::Pinhole,

@@ -144,7 +144,7 @@ vk_enum! {
     /// The place where a pipeline's draws take their camera from.
     #[doc(alias = "VkGaussianCameraSourceGAURAST")]
     pub struct GaussianCameraSourceGAURAST {
-        /// From the command buffer's state, set by `vkCmdSetGaussianCameraGAURAST`.
+        /// From the command buffer's state, set by `vkCmdSetGaussianCamerasGAURAST`.
         #[doc(alias = "VK_GAUSSIAN_CAMERA_SOURCE_COMMAND_GAURAST")]
         COMMAND = 0,
         /// From a uniform buffer, read when the draw executes: reused command buffers and cameras
@@ -244,6 +244,8 @@ pub struct PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'a> {
     pub gaussian_multisample: vk::Bool32,
     /// [`PipelineGaussianApproximationStateCreateInfoGAURAST`] with numbers other than 0.
     pub gaussian_approximation: vk::Bool32,
+    /// Gaussian pipelines with a view mask other than 0, and a camera for each view.
+    pub gaussian_multiview: vk::Bool32,
     /// The lifetime of the `p_next` chain.
     pub _marker: PhantomData<&'a ()>,
 }
@@ -280,6 +282,7 @@ impl Default for PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_> {
             gaussian_depth_stencil: vk::Bool32::default(),
             gaussian_multisample: vk::Bool32::default(),
             gaussian_approximation: vk::Bool32::default(),
+            gaussian_multiview: vk::Bool32::default(),
             _marker: PhantomData,
         }
     }
@@ -306,6 +309,7 @@ impl PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_> {
         gaussian_depth_stencil,
         gaussian_multisample,
         gaussian_approximation,
+        gaussian_multiview,
     }
 }
 
@@ -534,10 +538,15 @@ pub struct PipelineGaussianStateCreateInfoGAURAST<'a> {
     /// The descriptor set of the camera's uniform buffer. Camera source
     /// [`GaussianCameraSourceGAURAST::UNIFORM_BUFFER`] only.
     pub camera_set: u32,
-    /// The binding of the camera's uniform buffer, which holds a [`GaussianCameraDataGAURAST`] at
-    /// its start. The pipeline layout must have it as a (dynamic) uniform buffer visible to the
-    /// vertex stage. Camera source [`GaussianCameraSourceGAURAST::UNIFORM_BUFFER`] only.
+    /// The binding of the cameras' uniform buffer, which holds `camera_count` of
+    /// [`GaussianCameraDataGAURAST`] at its start. The pipeline layout must have it as a (dynamic)
+    /// uniform buffer visible to the vertex stage. Camera source
+    /// [`GaussianCameraSourceGAURAST::UNIFORM_BUFFER`] only.
     pub camera_binding: u32,
+    /// The number of cameras in the uniform buffer: 1, for all views, or more than the greatest
+    /// view index of the pipeline's view mask, so that view i sees through camera i. Camera source
+    /// [`GaussianCameraSourceGAURAST::UNIFORM_BUFFER`] only.
+    pub camera_count: u32,
     /// The lifetime of the `p_next` chain.
     pub _marker: PhantomData<&'a ()>,
 }
@@ -568,6 +577,7 @@ impl PipelineGaussianStateCreateInfoGAURAST<'_> {
         camera_source: GaussianCameraSourceGAURAST,
         camera_set: u32,
         camera_binding: u32,
+        camera_count: u32,
     }
 }
 
@@ -628,7 +638,7 @@ impl PipelineGaussianApproximationStateCreateInfoGAURAST<'_> {
     }
 }
 
-/// A camera, for `vkCmdSetGaussianCameraGAURAST`.
+/// A camera, for `vkCmdSetGaussianCamerasGAURAST`.
 ///
 /// A world-space point p has camera coordinates t = `rotation` (p - `eye`), with +x right, +y
 /// down and +z forward in the picture. [`GaussianCameraModelGAURAST`] says how t becomes a
@@ -648,24 +658,24 @@ pub struct GaussianCameraGAURAST<'a> {
     pub s_type: vk::StructureType,
     /// The next structure of the chain, or null.
     pub p_next: *const c_void,
+    /// The camera's position in world space; double, so that scenes far from the origin lose
+    /// nothing.
+    pub eye: [f64; 3],
     /// The way in which camera coordinates become pixels.
     pub model: GaussianCameraModelGAURAST,
     /// The rotation from world to camera axes, row-major: the rows are the directions right, down
     /// and forward in world space. Orthonormal; it may mirror, for left-handed worlds.
     pub rotation: [f32; 9],
-    /// The camera's position in world space; double, so that scenes far from the origin lose
-    /// nothing.
-    pub eye: [f64; 3],
     /// fx and fy; positive. Pixels, pixels per unit of length, or pixels per radian, by the model.
     pub focal_length: [f32; 2],
     /// cx and cy in pixels: where the point straight ahead appears.
     pub principal_point: [f32; 2],
+    /// c0 and c1.
+    pub depth_coefficients: [f32; 2],
     /// The least z, exclusive; greater than 0 unless the camera is orthographic. 0.2 in 3DGS.
     pub near_plane: f32,
     /// The greatest z, exclusive; greater than `near_plane`. It may be infinite.
     pub far_plane: f32,
-    /// c0 and c1.
-    pub depth_coefficients: [f32; 2],
     /// The lifetime of the `p_next` chain.
     pub _marker: PhantomData<&'a ()>,
 }
@@ -674,22 +684,23 @@ tagged_structure!(GaussianCameraGAURAST = STRUCTURE_TYPE_GAUSSIAN_CAMERA_GAURAST
 
 impl GaussianCameraGAURAST<'_> {
     setters! {
+        eye: [f64; 3],
         model: GaussianCameraModelGAURAST,
         rotation: [f32; 9],
-        eye: [f64; 3],
         focal_length: [f32; 2],
         principal_point: [f32; 2],
+        depth_coefficients: [f32; 2],
         near_plane: f32,
         far_plane: f32,
-        depth_coefficients: [f32; 2],
     }
 }
 
-/// The camera as a uniform buffer holds it, 112 bytes.
+/// A camera as a uniform buffer holds it, 128 bytes: an element of the array of a pipeline's
+/// cameras.
 ///
-/// The meaning is that of [`GaussianCameraGAURAST`]. The layout is this one whatever block
-/// layout the shaders use, and it equals the std140 and std430 layouts of the block
-/// `GaussianCamera` in the extension's specification.
+/// Members and meaning are those of [`GaussianCameraGAURAST`]. The layout is this one whatever
+/// block layout the shaders use, and it equals that of an array of the structure
+/// `GaussianCamera` of the extension's specification in std140 and std430.
 ///
 /// A shader without 64-bit floats writes the eye as three pairs of words, low word first.
 #[doc(alias = "VkGaussianCameraDataGAURAST")]
@@ -715,6 +726,8 @@ pub struct GaussianCameraDataGAURAST {
     pub near_plane: f32,
     /// As [`GaussianCameraGAURAST::far_plane`].
     pub far_plane: f32,
+    /// Not read: an element of an array takes 128 bytes.
+    pub padding: [u32; 4],
 }
 
 impl GaussianCameraDataGAURAST {
@@ -728,12 +741,14 @@ impl GaussianCameraDataGAURAST {
         depth_coefficients: [f32; 2],
         near_plane: f32,
         far_plane: f32,
+        padding: [u32; 4],
     }
 }
 
-/// The type of `vkCmdSetGaussianCameraGAURAST`.
+/// The type of `vkCmdSetGaussianCamerasGAURAST`.
 #[allow(non_camel_case_types)]
-pub type PFN_vkCmdSetGaussianCameraGAURAST = unsafe extern "system" fn(
+pub type PFN_vkCmdSetGaussianCamerasGAURAST = unsafe extern "system" fn(
     command_buffer: vk::CommandBuffer,
-    p_camera: *const GaussianCameraGAURAST<'_>,
+    camera_count: u32,
+    p_cameras: *const GaussianCameraGAURAST<'_>,
 );

@@ -39,6 +39,7 @@ fn features() {
         gaussian_depth_stencil: 80,
         gaussian_multisample: 84,
         gaussian_approximation: 88,
+        gaussian_multiview: 92,
     });
 }
 
@@ -78,7 +79,7 @@ fn pipeline_state() {
         accumulated_color: 0,
         depth: 4,
     });
-    assert_layout!(PipelineGaussianStateCreateInfoGAURAST<'_>, 128, 8, {
+    assert_layout!(PipelineGaussianStateCreateInfoGAURAST<'_>, 136, 8, {
         s_type: 0,
         p_next: 8,
         flags: 16,
@@ -99,6 +100,7 @@ fn pipeline_state() {
         camera_source: 116,
         camera_set: 120,
         camera_binding: 124,
+        camera_count: 128,
     });
     assert_layout!(PipelineGaussianApproximationStateCreateInfoGAURAST<'_>, 24, 8, {
         s_type: 0,
@@ -113,16 +115,16 @@ fn camera() {
     assert_layout!(GaussianCameraGAURAST<'_>, 112, 8, {
         s_type: 0,
         p_next: 8,
-        model: 16,
-        rotation: 20,
-        eye: 56,
+        eye: 16,
+        model: 40,
+        rotation: 44,
         focal_length: 80,
         principal_point: 88,
-        near_plane: 96,
-        far_plane: 100,
-        depth_coefficients: 104,
+        depth_coefficients: 96,
+        near_plane: 104,
+        far_plane: 108,
     });
-    assert_layout!(GaussianCameraDataGAURAST, 112, 8, {
+    assert_layout!(GaussianCameraDataGAURAST, 128, 8, {
         eye: 0,
         model: 24,
         reserved: 28,
@@ -132,13 +134,14 @@ fn camera() {
         depth_coefficients: 96,
         near_plane: 104,
         far_plane: 108,
+        padding: 112,
     });
 }
 
 #[gaurast_runner::test]
 fn names_and_values() {
     assert_eq!(NAME.to_str(), Ok("VK_GAURAST_gaussian_primitive_topology"));
-    assert_eq!(SPEC_VERSION, 1);
+    assert_eq!(SPEC_VERSION, 2);
     let first = 1_000_000_000 + (EXTENSION_NUMBER as i32 - 1) * 1000;
     assert_eq!(first, 1_000_997_000);
     assert_eq!(PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST.as_raw(), first);

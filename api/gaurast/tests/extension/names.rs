@@ -159,6 +159,13 @@ pub const LAYOUT: &[(&str, usize)] = &[
         ),
     ),
     (
+        "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, gaussianMultiview)",
+        offset_of!(
+            PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
+            gaussian_multiview
+        ),
+    ),
+    (
         "sizeof(VkPhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST)",
         size_of::<PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_>>(),
     ),
@@ -392,6 +399,10 @@ pub const LAYOUT: &[(&str, usize)] = &[
         offset_of!(PipelineGaussianStateCreateInfoGAURAST<'_>, camera_binding),
     ),
     (
+        "offsetof(VkPipelineGaussianStateCreateInfoGAURAST, cameraCount)",
+        offset_of!(PipelineGaussianStateCreateInfoGAURAST<'_>, camera_count),
+    ),
+    (
         "sizeof(VkPipelineGaussianApproximationStateCreateInfoGAURAST)",
         size_of::<PipelineGaussianApproximationStateCreateInfoGAURAST<'_>>(),
     ),
@@ -436,16 +447,16 @@ pub const LAYOUT: &[(&str, usize)] = &[
         offset_of!(GaussianCameraGAURAST<'_>, p_next),
     ),
     (
+        "offsetof(VkGaussianCameraGAURAST, eye)",
+        offset_of!(GaussianCameraGAURAST<'_>, eye),
+    ),
+    (
         "offsetof(VkGaussianCameraGAURAST, model)",
         offset_of!(GaussianCameraGAURAST<'_>, model),
     ),
     (
         "offsetof(VkGaussianCameraGAURAST, rotation)",
         offset_of!(GaussianCameraGAURAST<'_>, rotation),
-    ),
-    (
-        "offsetof(VkGaussianCameraGAURAST, eye)",
-        offset_of!(GaussianCameraGAURAST<'_>, eye),
     ),
     (
         "offsetof(VkGaussianCameraGAURAST, focalLength)",
@@ -456,16 +467,16 @@ pub const LAYOUT: &[(&str, usize)] = &[
         offset_of!(GaussianCameraGAURAST<'_>, principal_point),
     ),
     (
+        "offsetof(VkGaussianCameraGAURAST, depthCoefficients)",
+        offset_of!(GaussianCameraGAURAST<'_>, depth_coefficients),
+    ),
+    (
         "offsetof(VkGaussianCameraGAURAST, nearPlane)",
         offset_of!(GaussianCameraGAURAST<'_>, near_plane),
     ),
     (
         "offsetof(VkGaussianCameraGAURAST, farPlane)",
         offset_of!(GaussianCameraGAURAST<'_>, far_plane),
-    ),
-    (
-        "offsetof(VkGaussianCameraGAURAST, depthCoefficients)",
-        offset_of!(GaussianCameraGAURAST<'_>, depth_coefficients),
     ),
     (
         "sizeof(VkGaussianCameraDataGAURAST)",
@@ -506,6 +517,10 @@ pub const LAYOUT: &[(&str, usize)] = &[
     (
         "offsetof(VkGaussianCameraDataGAURAST, farPlane)",
         offset_of!(GaussianCameraDataGAURAST, far_plane),
+    ),
+    (
+        "offsetof(VkGaussianCameraDataGAURAST, padding)",
+        offset_of!(GaussianCameraDataGAURAST, padding),
     ),
 ];
 

@@ -21,8 +21,19 @@ pub(crate) enum DrawError {
     #[error("no graphics pipeline is bound")]
     Pipeline,
     /// No camera.
-    #[error("no camera is set: vkCmdSetGaussianCameraGAURAST must be recorded before the draw")]
+    #[error("no camera is set: vkCmdSetGaussianCamerasGAURAST must be recorded before the draw")]
     Camera,
+    /// No camera of a view.
+    #[error(
+        "there are {cameras} cameras, and view {view} would have number {view}: there must be one for all views, or more \
+         than the greatest view index (VUID-vkCmdDraw-cameraCount-GAURAST)"
+    )]
+    CameraOfView {
+        /// The view index.
+        view: u32,
+        /// Cameras.
+        cameras: usize,
+    },
     /// A camera of a model that is not enabled.
     #[error(
         "the camera's model is {0:?}, and its feature is not enabled (VUID-VkGaussianCameraGAURAST-model-parameter)"

@@ -12,7 +12,8 @@ use crate::pipeline::gaussian::{
 use crate::pipeline::state::AttributeSource;
 use simdevice::Packet;
 use simdevice::packet::{
-    GaussianAppend, GaussianAttributes, GaussianBegin, GaussianFragmentStage, ModelAttributes,
+    BufferRange, GaussianAppend, GaussianAttributes, GaussianBegin, GaussianFragmentStage,
+    ModelAttributes,
 };
 use simdevice::program::bindings::Bindings;
 use simdevice::state::gaussian::{
@@ -26,9 +27,13 @@ use std::sync::Arc;
 /// # Errors
 /// [`DrawError`] where bound state that the set needs is missing.
 pub(crate) fn begin(state: &State, gaussian: &GaussianPipeline) -> Result<Vec<Packet>, DrawError> {
+    let [camera, further_cameras @ ..] = &*enabled_cameras(state, gaussian)? else {
+        return Err(DrawError::Camera);
+    };
     let mut packets = vec![Packet::GaussianBegin(Box::new(GaussianBegin {
         state: fixed_state(state, gaussian)?,
-        camera: enabled_camera(state, gaussian)?,
+        camera: *camera,
+        further_cameras: further_cameras.to_vec(),
         viewport: upright(state.viewport(gaussian).ok_or(DrawError::Viewport)?),
         scissor: state.scissor(gaussian).ok_or(DrawError::Scissor)?,
     }))];
@@ -113,9 +118,26 @@ fn shaded(
     )))
 }
 
-/// The camera that a draw sees with, if its model's feature is enabled.
-fn enabled_camera(state: &State, gaussian: &GaussianPipeline) -> Result<Camera, DrawError> {
-    let camera = camera(state, gaussian.camera)?;
+/// The cameras that the views of a draw are seen with, in the order of views, if their models' features are enabled: one for
+/// all of them, or one for each.
+fn enabled_cameras(state: &State, gaussian: &GaussianPipeline) -> Result<Vec<Camera>, DrawError> {
+    let source = Cameras::new(state, gaussian.camera)?;
+    let views = (0..u32::BITS).filter(|view| gaussian.view_mask >> view & 1 == 1);
+    let cameras = match source.len() {
+        0 => return Err(DrawError::Camera),
+        count if count > 1 && gaussian.view_mask != 0 => views
+            .map(|view| source.get(view, count))
+            .collect::<Result<Vec<_>, _>>()?,
+        count => vec![source.get(0, count)?],
+    };
+    for camera in &cameras {
+        check_camera(camera, gaussian)?;
+    }
+    Ok(cameras)
+}
+
+/// Refuses a camera whose model is not enabled, or does not see Gaussians of the pipeline's modes.
+fn check_camera(camera: &Camera, gaussian: &GaussianPipeline) -> Result<(), DrawError> {
     if !gaussian.camera_models.have(camera.model) {
         return Err(DrawError::CameraModel(camera.model));
     }
@@ -128,27 +150,66 @@ fn enabled_camera(state: &State, gaussian: &GaussianPipeline) -> Result<Camera, 
                 && state.precision == GaussianPrecision::Float32
         }
     };
-    if !is_seen {
-        return Err(DrawError::ModeOfCameraModel(camera.model));
+    match is_seen {
+        true => Ok(()),
+        false => Err(DrawError::ModeOfCameraModel(camera.model)),
     }
-    Ok(camera)
 }
 
-/// The camera that a draw is given.
-fn camera(state: &State, source: CameraSource) -> Result<Camera, DrawError> {
-    let (set, binding) = match source {
-        CameraSource::None => return Ok(Camera::default()),
-        CameraSource::Command => return state.camera.ok_or(DrawError::Camera),
-        CameraSource::UniformBuffer { set, binding } => (set, binding),
-    };
-    let bound = state
-        .graphics_sets
-        .get(set)
-        .ok_or(DescriptorSetNotBound(set))?;
-    let range = bound
-        .buffer(binding)
-        .ok_or(DrawError::CameraBuffer { set, binding })?;
-    camera::read(&range).map_err(|error| DrawError::CameraData(error.to_string()))
+/// The cameras that a draw is given.
+enum Cameras<'a> {
+    /// One that means nothing.
+    None,
+    /// Those that a command has set.
+    Set(&'a [Camera]),
+    /// Those of a uniform buffer.
+    Buffer { range: BufferRange, count: usize },
+}
+
+impl<'a> Cameras<'a> {
+    fn new(state: &'a State, source: CameraSource) -> Result<Self, DrawError> {
+        let (set, binding, count) = match source {
+            CameraSource::None => return Ok(Self::None),
+            CameraSource::Command => return Ok(Self::Set(&state.cameras)),
+            CameraSource::UniformBuffer {
+                set,
+                binding,
+                count,
+            } => (set, binding, count),
+        };
+        let bound = state
+            .graphics_sets
+            .get(set)
+            .ok_or(DescriptorSetNotBound(set))?;
+        let range = bound
+            .buffer(binding)
+            .ok_or(DrawError::CameraBuffer { set, binding })?;
+        Ok(Self::Buffer {
+            range,
+            count: count as usize,
+        })
+    }
+
+    fn len(&self) -> usize {
+        match self {
+            Self::None => 1,
+            Self::Set(cameras) => cameras.len(),
+            Self::Buffer { count, .. } => *count,
+        }
+    }
+
+    /// The camera of a view, of `cameras` that there are.
+    fn get(&self, view: u32, cameras: usize) -> Result<Camera, DrawError> {
+        let none = DrawError::CameraOfView { view, cameras };
+        let number = view as usize;
+        match self {
+            Self::None => Ok(Camera::default()),
+            Self::Set(cameras) => cameras.get(number).copied().ok_or(none),
+            Self::Buffer { count, .. } if number >= *count => Err(none),
+            Self::Buffer { range, .. } => camera::read(range, number)
+                .map_err(|error| DrawError::CameraData(error.to_string())),
+        }
+    }
 }
 
 /// The state of the pipeline, with the dynamic part filled in.

@@ -146,7 +146,7 @@ fn execute(
             state.dynamic_states.set(*dynamic_state);
             state.draw_state = None;
         }
-        Command::SetCamera(camera) => state.camera = Some(**camera),
+        Command::SetCameras(cameras) => state.cameras.clone_from(cameras),
         Command::Draw(parameters) => draw(state, parameters, 0, execution)?,
         Command::DrawIndirect(indirect) => draw_indirect(state, indirect, execution)?,
         Command::BindComputePipeline(pipeline) => state.compute_pipeline = Some(pipeline.clone()),

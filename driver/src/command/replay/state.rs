@@ -41,8 +41,9 @@ pub(crate) struct State {
     pub(crate) dynamic_states: DynamicStates,
     /// The fixed-function state that the last draw made of all this, unless something has changed since.
     pub(crate) draw_state: Option<Arc<DrawState>>,
-    /// The camera of Gaussian draws; kept when another pipeline is bound.
-    pub(crate) camera: Option<Camera>,
+    /// The cameras of Gaussian draws, one for all views or one for each, if they were set; kept when another pipeline is
+    /// bound.
+    pub(crate) cameras: Box<[Camera]>,
     /// True if draws are being merged into a sorted set that has begun.
     pub(crate) merged_draws_open: bool,
 }

@@ -39,8 +39,10 @@ pub(crate) struct GaussianPipeline {
     pub(crate) viewport: Option<Viewport>,
     /// The scissor, unless it is dynamic.
     pub(crate) scissor: Option<Rect>,
-    /// The source of draws' camera.
+    /// The source of draws' cameras.
     pub(crate) camera: CameraSource,
+    /// The views of the passes that it draws in, a bit each; none if they have none.
+    pub(crate) view_mask: u32,
     /// The models that the camera may have.
     pub(crate) camera_models: CameraModels,
     /// True if consecutive draws are sorted together.
@@ -79,12 +81,12 @@ pub(crate) struct GaussianAttributeSources {
     pub(crate) model_opacity: Option<AttributeSource>,
 }
 
-/// The source of Gaussian draws' camera.
+/// The source of Gaussian draws' cameras.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum CameraSource {
     /// There is none: a vertex shader projects.
     None,
-    /// `vkCmdSetGaussianCameraGAURAST`.
+    /// `vkCmdSetGaussianCamerasGAURAST`.
     Command,
     /// A uniform buffer, read when the draw executes.
     UniformBuffer {
@@ -92,6 +94,8 @@ pub(crate) enum CameraSource {
         set: u32,
         /// The binding, whose first descriptor it is.
         binding: u32,
+        /// Cameras in the buffer.
+        count: u32,
     },
 }
 
@@ -139,10 +143,9 @@ impl GaussianPipeline {
                 ),
             ));
         };
-        if info.fragment_output.view_mask != 0 {
-            return Err(Error::FeatureNotPresent(
-                "Gaussians in a pass with views".into(),
-            ));
+        let view_mask = info.fragment_output.view_mask;
+        if view_mask != 0 {
+            require(features, MULTIVIEW, "the view mask is not 0")?;
         }
         combinations(info, gaussian)?;
         stages(info, gaussian, features)?;
@@ -178,6 +181,7 @@ impl GaussianPipeline {
             )?
             .map(convert::rect),
             camera: camera_source(info, gaussian, features)?,
+            view_mask,
             camera_models: CameraModels::of(features),
             merges_draws: gaussian
                 .flags
@@ -354,7 +358,23 @@ fn camera_source(
             ),
         ));
     }
-    Ok(CameraSource::UniformBuffer { set, binding })
+    let count = gaussian.camera_count;
+    let views = u32::BITS - info.fragment_output.view_mask.leading_zeros();
+    if count == 0 || count > 1 && count < views {
+        return Err(Error::usage(
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-cameraCount-views",
+            format!(
+                "{STRUCTURE}: cameraCount is {count}, but must be 1, for all views, or greater than the greatest view \
+                 index of view mask {:#b}",
+                info.fragment_output.view_mask
+            ),
+        ));
+    }
+    Ok(CameraSource::UniformBuffer {
+        set,
+        binding,
+        count,
+    })
 }
 
 /// Tells if a binding is a uniform buffer that the vertex stage sees.

@@ -128,7 +128,7 @@ impl ResolveStage {
             color: &color,
             second_source: info.fragment_output.blend.iter().any(reads_second_source),
             points: false,
-            views: false,
+            views: info.fragment_output.view_mask != 0,
         };
         let programs = link::link_resolve(fragment, &varyings, live_outputs)?;
         let program = GaussianFragmentProgram::new(device.simulated().level(), &programs)

@@ -101,6 +101,12 @@ pub(super) const APPROXIMATION: Feature = (
     "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianApproximation-feature",
 );
 
+pub(super) const MULTIVIEW: Feature = (
+    |features| features.gaussian_multiview,
+    "gaussianMultiview",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianMultiview-feature",
+);
+
 /// Refuses `what` unless its feature is enabled, which one that the device lacks never is.
 pub(super) fn require(features: &Features, feature: Feature, what: &str) -> Result<(), Error> {
     if feature.0(features) {

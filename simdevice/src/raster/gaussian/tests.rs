@@ -122,6 +122,7 @@ fn draw_with_depth(
     };
     let begin = GaussianBegin {
         state: Arc::new(state),
+        further_cameras: Vec::new(),
         camera: Camera {
             model: CameraModel::Pinhole,
             rotation: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
