@@ -32,6 +32,16 @@ extern "C" {
 #define VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_STATE_CREATE_INFO_GAURAST ((VkStructureType)1000997002)
 #define VK_STRUCTURE_TYPE_GAUSSIAN_CAMERA_GAURAST ((VkStructureType)1000997003)
 #define VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_APPROXIMATION_STATE_CREATE_INFO_GAURAST ((VkStructureType)1000997004)
+#define VK_STRUCTURE_TYPE_GAUSSIAN_SPHERICAL_HARMONICS_BUFFER_GAURAST ((VkStructureType)1000997005)
+#define VK_DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST ((VkDynamicState)1000997000)
+#define VK_DYNAMIC_STATE_GAUSSIAN_ANTIALIASING_GAURAST ((VkDynamicState)1000997001)
+#define VK_DYNAMIC_STATE_GAUSSIAN_LOW_PASS_VARIANCE_GAURAST ((VkDynamicState)1000997002)
+#define VK_DYNAMIC_STATE_GAUSSIAN_ALPHA_FLOOR_GAURAST ((VkDynamicState)1000997003)
+#define VK_DYNAMIC_STATE_GAUSSIAN_ALPHA_CEILING_GAURAST ((VkDynamicState)1000997004)
+#define VK_DYNAMIC_STATE_GAUSSIAN_TRANSMITTANCE_FLOOR_GAURAST ((VkDynamicState)1000997005)
+#define VK_DYNAMIC_STATE_GAUSSIAN_SPHERICAL_HARMONICS_DEGREE_GAURAST ((VkDynamicState)1000997006)
+#define VK_DYNAMIC_STATE_GAUSSIAN_EXPONENTIAL_ERROR_GAURAST ((VkDynamicState)1000997007)
+#define VK_DYNAMIC_STATE_GAUSSIAN_CONTRIBUTION_BUDGET_GAURAST ((VkDynamicState)1000997008)
 
 typedef enum VkGaussianProjectionModeGAURAST {
     VK_GAUSSIAN_PROJECTION_MODE_FIXED_FUNCTION_GAURAST = 0,
@@ -86,7 +96,9 @@ typedef enum VkGaussianCameraModelGAURAST {
 } VkGaussianCameraModelGAURAST;
 
 typedef enum VkPipelineGaussianStateCreateFlagBitsGAURAST {
-    VK_PIPELINE_GAUSSIAN_STATE_CREATE_MERGE_DRAWS_BIT_GAURAST = 0x00000001,
+    VK_PIPELINE_GAUSSIAN_STATE_CREATE_LOG_SCALE_BIT_GAURAST = 0x00000001,
+    VK_PIPELINE_GAUSSIAN_STATE_CREATE_LOGIT_OPACITY_BIT_GAURAST = 0x00000002,
+    VK_PIPELINE_GAUSSIAN_STATE_CREATE_SPHERICAL_HARMONICS_BUFFER_BIT_GAURAST = 0x00000004,
     VK_PIPELINE_GAUSSIAN_STATE_CREATE_FLAG_BITS_MAX_ENUM_GAURAST = 0x7FFFFFFF
 } VkPipelineGaussianStateCreateFlagBitsGAURAST;
 typedef VkFlags VkPipelineGaussianStateCreateFlagsGAURAST;
@@ -114,14 +126,15 @@ typedef struct VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST {
     VkBool32           gaussianMultisample;
     VkBool32           gaussianApproximation;
     VkBool32           gaussianMultiview;
+    VkBool32           attributeActivation;
+    VkBool32           sphericalHarmonicsBuffer;
+    VkBool32           gaussianDynamicState;
 } VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST;
 
 typedef struct VkPhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST {
     VkStructureType       sType;
     void*                 pNext;
     VkExtent2D            tileSize;
-    uint32_t              rasterizerModuleCount;
-    uint32_t              processingElementCount;
     uint32_t              maxSphericalHarmonicsDegree;
     VkSampleCountFlags    gaussianSampleCounts;
     uint64_t              maxGaussiansPerDraw;
@@ -194,6 +207,16 @@ typedef struct VkGaussianCameraGAURAST {
     float                           farPlane;
 } VkGaussianCameraGAURAST;
 
+typedef struct VkGaussianSphericalHarmonicsBufferGAURAST {
+    VkStructureType    sType;
+    const void*        pNext;
+    VkDeviceAddress    deviceAddress;
+    VkDeviceSize       size;
+    VkFormat           format;
+    uint32_t           stride;
+    VkDeviceSize       coefficientStride;
+} VkGaussianSphericalHarmonicsBufferGAURAST;
+
 typedef struct VkGaussianCameraDataGAURAST {
     double                          eye[3];
     VkGaussianCameraModelGAURAST    model;
@@ -208,6 +231,18 @@ typedef struct VkGaussianCameraDataGAURAST {
 } VkGaussianCameraDataGAURAST;
 
 typedef void (VKAPI_PTR *PFN_vkCmdSetGaussianCamerasGAURAST)(VkCommandBuffer commandBuffer, uint32_t cameraCount, const VkGaussianCameraGAURAST* pCameras);
+typedef void (VKAPI_PTR *PFN_vkCmdBeginGaussianSetGAURAST)(VkCommandBuffer commandBuffer);
+typedef void (VKAPI_PTR *PFN_vkCmdEndGaussianSetGAURAST)(VkCommandBuffer commandBuffer);
+typedef void (VKAPI_PTR *PFN_vkCmdSetGaussianOrderGAURAST)(VkCommandBuffer commandBuffer, VkGaussianOrderGAURAST order);
+typedef void (VKAPI_PTR *PFN_vkCmdSetGaussianAntialiasingGAURAST)(VkCommandBuffer commandBuffer, VkGaussianAntialiasingGAURAST antialiasing);
+typedef void (VKAPI_PTR *PFN_vkCmdSetGaussianLowPassVarianceGAURAST)(VkCommandBuffer commandBuffer, float lowPassVariance);
+typedef void (VKAPI_PTR *PFN_vkCmdSetGaussianAlphaFloorGAURAST)(VkCommandBuffer commandBuffer, float alphaFloor);
+typedef void (VKAPI_PTR *PFN_vkCmdSetGaussianAlphaCeilingGAURAST)(VkCommandBuffer commandBuffer, float alphaCeiling);
+typedef void (VKAPI_PTR *PFN_vkCmdSetGaussianTransmittanceFloorGAURAST)(VkCommandBuffer commandBuffer, float transmittanceFloor);
+typedef void (VKAPI_PTR *PFN_vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST)(VkCommandBuffer commandBuffer, uint32_t sphericalHarmonicsDegree);
+typedef void (VKAPI_PTR *PFN_vkCmdSetGaussianExponentialErrorGAURAST)(VkCommandBuffer commandBuffer, float exponentialError);
+typedef void (VKAPI_PTR *PFN_vkCmdSetGaussianContributionBudgetGAURAST)(VkCommandBuffer commandBuffer, float contributionBudget);
+typedef void (VKAPI_PTR *PFN_vkCmdBindGaussianSphericalHarmonicsGAURAST)(VkCommandBuffer commandBuffer, const VkGaussianSphericalHarmonicsBufferGAURAST* pBuffer);
 
 #ifndef VK_NO_PROTOTYPES
 /* Not exported by the loader: get it with vkGetDeviceProcAddr. */
@@ -215,6 +250,40 @@ VKAPI_ATTR void VKAPI_CALL vkCmdSetGaussianCamerasGAURAST(
     VkCommandBuffer                             commandBuffer,
     uint32_t                                    cameraCount,
     const VkGaussianCameraGAURAST*              pCameras);
+VKAPI_ATTR void VKAPI_CALL vkCmdBeginGaussianSetGAURAST(
+    VkCommandBuffer                             commandBuffer);
+VKAPI_ATTR void VKAPI_CALL vkCmdEndGaussianSetGAURAST(
+    VkCommandBuffer                             commandBuffer);
+VKAPI_ATTR void VKAPI_CALL vkCmdSetGaussianOrderGAURAST(
+    VkCommandBuffer                             commandBuffer,
+    VkGaussianOrderGAURAST                      order);
+VKAPI_ATTR void VKAPI_CALL vkCmdSetGaussianAntialiasingGAURAST(
+    VkCommandBuffer                             commandBuffer,
+    VkGaussianAntialiasingGAURAST               antialiasing);
+VKAPI_ATTR void VKAPI_CALL vkCmdSetGaussianLowPassVarianceGAURAST(
+    VkCommandBuffer                             commandBuffer,
+    float                                       lowPassVariance);
+VKAPI_ATTR void VKAPI_CALL vkCmdSetGaussianAlphaFloorGAURAST(
+    VkCommandBuffer                             commandBuffer,
+    float                                       alphaFloor);
+VKAPI_ATTR void VKAPI_CALL vkCmdSetGaussianAlphaCeilingGAURAST(
+    VkCommandBuffer                             commandBuffer,
+    float                                       alphaCeiling);
+VKAPI_ATTR void VKAPI_CALL vkCmdSetGaussianTransmittanceFloorGAURAST(
+    VkCommandBuffer                             commandBuffer,
+    float                                       transmittanceFloor);
+VKAPI_ATTR void VKAPI_CALL vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST(
+    VkCommandBuffer                             commandBuffer,
+    uint32_t                                    sphericalHarmonicsDegree);
+VKAPI_ATTR void VKAPI_CALL vkCmdSetGaussianExponentialErrorGAURAST(
+    VkCommandBuffer                             commandBuffer,
+    float                                       exponentialError);
+VKAPI_ATTR void VKAPI_CALL vkCmdSetGaussianContributionBudgetGAURAST(
+    VkCommandBuffer                             commandBuffer,
+    float                                       contributionBudget);
+VKAPI_ATTR void VKAPI_CALL vkCmdBindGaussianSphericalHarmonicsGAURAST(
+    VkCommandBuffer                             commandBuffer,
+    const VkGaussianSphericalHarmonicsBufferGAURAST* pBuffer);
 #endif
 
 #ifdef __cplusplus

@@ -282,7 +282,6 @@ impl CommandProcessor {
 
     /// Adds a draw to the pass.
     fn draw(&mut self, draw: PassDraw) -> Result<(), ExecutionError> {
-        self.outside_gaussian_set()?;
         let pass = self.pass.as_mut().ok_or(ExecutionError::OutsidePass)?;
         Ok(pass.push(draw, self.device.runtime(), &mut self.counters)?)
     }
@@ -305,7 +304,6 @@ impl CommandProcessor {
     /// Points, lines or triangles of a view, or of the layers that they say, part by part.
     fn primitives_of_view(&mut self, draw: &Draw, view: Option<u32>) -> Result<(), ExecutionError> {
         let pass = self.pass.as_ref().ok_or(ExecutionError::OutsidePass)?;
-        self.outside_gaussian_set()?;
         let surface = Surface {
             area: pass.area(),
             layers: pass.layer_count(),

@@ -143,7 +143,6 @@ fn pipelines() -> Vec<(&'static str, PipelineRequest<'static>)> {
 /// Pipelines that use a mode each, on a device on which none is enabled.
 fn modes() -> Vec<(&'static str, PipelineRequest<'static>)> {
     let buffer = GaussianCameraSourceGAURAST::UNIFORM_BUFFER;
-    let merge = PipelineGaussianStateCreateFlagsGAURAST::MERGE_DRAWS;
     let compensated = GaussianAntialiasingGAURAST::OPACITY_COMPENSATED;
     vec![
         (
@@ -176,8 +175,22 @@ fn modes() -> Vec<(&'static str, PipelineRequest<'static>)> {
             with(|s| s.geometry(GaussianGeometryGAURAST::GAUSSIAN_2D)),
         ),
         ("uniformBufferCamera", with(|s| s.camera_source(buffer))),
-        ("mergedDraws", with(|s| s.flags(merge))),
         ("gaussianApproximation", allowing(1e-3, 0.0)),
+        (
+            "attributeActivation",
+            with(|s| s.flags(PipelineGaussianStateCreateFlagsGAURAST::LOG_SCALE)),
+        ),
+        (
+            "sphericalHarmonicsBuffer",
+            with(|s| s.flags(PipelineGaussianStateCreateFlagsGAURAST::SPHERICAL_HARMONICS_BUFFER)),
+        ),
+        (
+            "gaussianDynamicState",
+            PipelineRequest {
+                dynamic: vec![gaurast::vk::DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST],
+                ..PipelineRequest::default()
+            },
+        ),
         (
             "gaussianMultiview",
             PipelineRequest {

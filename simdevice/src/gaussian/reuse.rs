@@ -10,7 +10,7 @@ use super::clusters::Clusters;
 use super::set::GaussianSet;
 use super::sorted_set::SortedSet;
 use crate::format::Format;
-use crate::packet::{AttributeStream, GaussianAppend};
+use crate::packet::{Activations, AttributeStream, GaussianAppend};
 use crate::state::gaussian::{Camera, GaussianState};
 use crate::state::{Rect, Viewport};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
@@ -22,6 +22,8 @@ pub(super) struct Key {
     streams: Vec<SourceFingerprint>,
     /// First vertex, vertices, first instance, instances of each draw.
     ranges: Vec<[u32; 4]>,
+    /// What is applied to the attributes of each.
+    activations: Vec<Activations>,
     /// The clusters of each, which its accounts depend on.
     clusters: Vec<Weak<Clusters>>,
     state: Arc<GaussianState>,
@@ -73,6 +75,9 @@ impl Key {
                 .map(SourceFingerprint::new)
                 .collect(),
             ranges: ranges.collect(),
+            activations: (set.appends.iter())
+                .map(|append| append.attributes.activations)
+                .collect(),
             clusters: clusters
                 .iter()
                 .map(|clusters| clusters.as_ref().map_or(Weak::new(), Arc::downgrade))
@@ -105,7 +110,8 @@ impl Key {
     /// Whether the same places in the set are in the same groups of both.
     fn has_same_batches(&self, other: &Self) -> bool {
         let mut clusters = self.clusters.iter().zip(&other.clusters);
-        self.ranges == other.ranges && clusters.all(|(a, b)| a.ptr_eq(b))
+        let same = self.ranges == other.ranges && self.activations == other.activations;
+        same && clusters.all(|(a, b)| a.ptr_eq(b))
     }
 
     /// Whether both draw the same buffer first, for the same view.

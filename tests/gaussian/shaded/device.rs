@@ -125,6 +125,7 @@ pub fn append(scene: &SceneBuffers) -> GaussianAppend {
             opacity: stream(buffer(&scene.opacities), 4, Format::R32Sfloat),
             spherical_harmonics: vec![triples(&scene.sh)],
             model: ModelAttributes::default(),
+            activations: Default::default(),
         },
         indices: None,
         first: 0,

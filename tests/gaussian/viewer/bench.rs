@@ -7,7 +7,7 @@ use ash::vk;
 use gaurast::gaussian_primitive_topology;
 use gaurast::vk::{
     GaussianAttributeLocationsGAURAST, PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST,
-    PipelineGaussianStateCreateInfoGAURAST,
+    PipelineGaussianApproximationStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 use gaurast_tests::scenes::SceneBuffers;
 use gaurast_tests::triangles::shader::{Stage, compile};
@@ -35,6 +35,21 @@ impl Stream {
             stride: size_of::<T>() as u32,
             rate: vk::VertexInputRate::VERTEX,
             attributes: vec![(location, format, 0)],
+        }
+    }
+
+    /// The rows of a matrix and a number by instance, at four locations.
+    pub fn of_instances(location: u32, instances: &[[f32; 13]]) -> Self {
+        let four = vk::Format::R32G32B32A32_SFLOAT;
+        Self {
+            rate: vk::VertexInputRate::INSTANCE,
+            attributes: vec![
+                (location, four, 0),
+                (location + 1, four, 16),
+                (location + 2, four, 32),
+                (location + 3, vk::Format::R32_SFLOAT, 48),
+            ],
+            ..Self::new(location, four, instances)
         }
     }
 
@@ -71,6 +86,7 @@ pub fn locations() -> GaussianAttributeLocationsGAURAST {
 #[derive(Clone)]
 pub struct Options<'a> {
     pub state: State,
+    pub approximation: Option<PipelineGaussianApproximationStateCreateInfoGAURAST<'static>>,
     pub view_mask: u32,
     /// Dynamic states beside viewport and scissor.
     pub dynamic: Vec<vk::DynamicState>,
@@ -86,6 +102,7 @@ impl Options<'_> {
             state: state
                 .spherical_harmonics_degree(degree)
                 .attribute_locations(locations()),
+            approximation: None,
             view_mask: 0,
             dynamic: Vec::new(),
             bindings: None,
@@ -145,6 +162,7 @@ impl Pipeline {
             .view_mask(options.view_mask)
             .color_attachment_formats(&[vk::Format::R32G32B32A32_SFLOAT]);
         let mut state = options.state;
+        let mut approximation = options.approximation.unwrap_or_default();
         let words = options.fragment.map(|text| compile(Stage::Fragment, text));
         let sets: Vec<_> = options.bindings.iter().map(|all| all.layout).collect();
         let layout_info = vk::PipelineLayoutCreateInfo::default().set_layouts(&sets);
@@ -157,7 +175,8 @@ impl Pipeline {
             .color_blend_state(&blend)
             .dynamic_state(&dynamic)
             .push_next(&mut rendering)
-            .push_next(&mut state);
+            .push_next(&mut state)
+            .push_next(&mut approximation);
         // SAFETY: see the module.
         unsafe {
             let module = words.map(|words| {

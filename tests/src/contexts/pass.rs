@@ -106,6 +106,16 @@ impl<'a> Commands<'a> {
         }
     }
 
+    /// Records draws that share a sorted set.
+    pub fn gaussian_set(&self, draws: impl FnOnce()) {
+        let gaussian = self.context.gaussian();
+        // SAFETY: see `contexts`.
+        unsafe { gaussian.cmd_begin_gaussian_set(self.raw) };
+        draws();
+        // SAFETY: see `contexts`.
+        unsafe { gaussian.cmd_end_gaussian_set(self.raw) };
+    }
+
     /// Binds what a pipeline with [`PipelineOptions::instances`](super::PipelineOptions::instances) needs besides.
     pub fn bind_instances(&self, instances: &Buffer) {
         let (device, raw) = (self.context.device(), instances.raw());

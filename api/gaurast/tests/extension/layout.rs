@@ -17,7 +17,7 @@ macro_rules! assert_layout {
 
 #[gaurast_runner::test]
 fn features() {
-    assert_layout!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, 96, 8, {
+    assert_layout!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, 112, 8, {
         s_type: 0,
         p_next: 8,
         gaussian_primitive_topology: 16,
@@ -40,21 +40,22 @@ fn features() {
         gaussian_multisample: 84,
         gaussian_approximation: 88,
         gaussian_multiview: 92,
+        attribute_activation: 96,
+        spherical_harmonics_buffer: 100,
+        gaussian_dynamic_state: 104,
     });
 }
 
 #[gaurast_runner::test]
 fn properties() {
-    assert_layout!(PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_>, 56, 8, {
+    assert_layout!(PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_>, 48, 8, {
         s_type: 0,
         p_next: 8,
         tile_size: 16,
-        rasterizer_module_count: 24,
-        processing_element_count: 28,
-        max_spherical_harmonics_degree: 32,
-        gaussian_sample_counts: 36,
-        max_gaussians_per_draw: 40,
-        max_gaussians_per_set: 48,
+        max_spherical_harmonics_degree: 24,
+        gaussian_sample_counts: 28,
+        max_gaussians_per_draw: 32,
+        max_gaussians_per_set: 40,
     });
 }
 
@@ -111,6 +112,19 @@ fn pipeline_state() {
 }
 
 #[gaurast_runner::test]
+fn spherical_harmonics_buffer() {
+    assert_layout!(GaussianSphericalHarmonicsBufferGAURAST<'_>, 48, 8, {
+        s_type: 0,
+        p_next: 8,
+        device_address: 16,
+        size: 24,
+        format: 32,
+        stride: 36,
+        coefficient_stride: 40,
+    });
+}
+
+#[gaurast_runner::test]
 fn camera() {
     assert_layout!(GaussianCameraGAURAST<'_>, 112, 8, {
         s_type: 0,
@@ -151,6 +165,7 @@ fn names_and_values() {
         STRUCTURE_TYPE_PIPELINE_GAUSSIAN_STATE_CREATE_INFO_GAURAST,
         STRUCTURE_TYPE_GAUSSIAN_CAMERA_GAURAST,
         STRUCTURE_TYPE_PIPELINE_GAUSSIAN_APPROXIMATION_STATE_CREATE_INFO_GAURAST,
+        STRUCTURE_TYPE_GAUSSIAN_SPHERICAL_HARMONICS_BUFFER_GAURAST,
     ];
     for (offset, structure_type) in structure_types.into_iter().enumerate() {
         assert_eq!(structure_type.as_raw(), first + offset as i32);
@@ -172,10 +187,6 @@ fn enum_values() {
     assert_eq!(GaussianCameraModelGAURAST::ORTHOGRAPHIC.as_raw(), 1);
     assert_eq!(GaussianCameraModelGAURAST::FISHEYE.as_raw(), 2);
     assert_eq!(GaussianCameraModelGAURAST::EQUIRECTANGULAR.as_raw(), 3);
-    assert_eq!(
-        PipelineGaussianStateCreateFlagsGAURAST::MERGE_DRAWS.as_raw(),
-        1
-    );
 }
 
 #[gaurast_runner::test]
@@ -186,5 +197,5 @@ fn debug_prints_names_and_unknown_numbers() {
     );
     assert_eq!(format!("{:?}", GaussianOrderGAURAST::from_raw(77)), "77");
     let flags = PipelineGaussianStateCreateFlagsGAURAST::from_raw(0b101);
-    assert_eq!(format!("{flags:?}"), "MERGE_DRAWS | 100");
+    assert_eq!(format!("{flags:?}"), "LOG_SCALE | 100");
 }

@@ -3,17 +3,17 @@
 use super::descriptors::{self, DescriptorSetNotBound};
 use super::draw::{DrawError, attribute_stream, indices};
 use super::state::State;
-use crate::command::{DrawParameters, camera};
+use crate::command::{DrawParameters, HarmonicsBuffer, camera};
 use crate::pipeline::GraphicsPipeline;
-use crate::pipeline::gaussian::stages::VertexProjection;
+use crate::pipeline::gaussian::stages::{ResolveStage, VertexProjection};
 use crate::pipeline::gaussian::{
-    CameraSource, GaussianAttributeSources, GaussianPipeline, GaussianSource,
+    CameraSource, GaussianAttributeSources, GaussianPipeline, GaussianSource, HarmonicsSource,
 };
 use crate::pipeline::state::AttributeSource;
 use simdevice::Packet;
 use simdevice::packet::{
-    BufferRange, GaussianAppend, GaussianAttributes, GaussianBegin, GaussianFragmentStage,
-    ModelAttributes,
+    AttributeStream, BufferRange, GaussianAppend, GaussianAttributes, GaussianBegin,
+    GaussianFragmentStage, ModelAttributes,
 };
 use simdevice::program::bindings::Bindings;
 use simdevice::state::gaussian::{
@@ -22,37 +22,55 @@ use simdevice::state::gaussian::{
 use simdevice::state::{DrawState, Topology, Viewport};
 use std::sync::Arc;
 
-/// The packets that begin a sorted set.
+/// The beginning of a sorted set.
+pub(crate) struct Begin {
+    /// The state of the set.
+    pub(crate) set: GaussianBegin,
+    /// The program that makes colours, if there is one.
+    resolve: Option<GaussianFragmentStage>,
+}
+
+impl Begin {
+    /// The packets that begin the set.
+    pub(crate) fn packets(self) -> Vec<Packet> {
+        let mut packets = vec![Packet::GaussianBegin(Box::new(self.set))];
+        let resolve = self.resolve.map(Box::new);
+        packets.extend(resolve.map(Packet::GaussianFragmentStage));
+        packets
+    }
+}
+
+/// The beginning of a sorted set.
 ///
 /// # Errors
 /// [`DrawError`] where bound state that the set needs is missing.
-pub(crate) fn begin(state: &State, gaussian: &GaussianPipeline) -> Result<Vec<Packet>, DrawError> {
+pub(crate) fn begin(state: &State, gaussian: &GaussianPipeline) -> Result<Begin, DrawError> {
     let [camera, further_cameras @ ..] = &*enabled_cameras(state, gaussian)? else {
         return Err(DrawError::Camera);
     };
-    let mut packets = vec![Packet::GaussianBegin(Box::new(GaussianBegin {
-        state: fixed_state(state, gaussian)?,
-        camera: *camera,
-        further_cameras: further_cameras.to_vec(),
-        viewport: upright(state.viewport(gaussian).ok_or(DrawError::Viewport)?),
-        scissor: state.scissor(gaussian).ok_or(DrawError::Scissor)?,
-    }))];
-    if let Some(stage) = &gaussian.resolve {
+    let resolve = |stage: &ResolveStage| {
         let (sets, constants) = (&state.graphics_sets, &state.push_constants);
-        packets.push(Packet::GaussianFragmentStage(Box::new(
-            GaussianFragmentStage {
-                program: Arc::clone(&stage.program),
-                bindings: descriptors::bindings(&stage.resources, sets, constants)?,
-                sample_shading: stage.sample_shading,
-                alpha_to_coverage: stage.alpha_to_coverage,
-                alpha_to_one: stage.alpha_to_one,
-            },
-        )));
-    }
-    Ok(packets)
+        Ok::<_, DrawError>(GaussianFragmentStage {
+            program: Arc::clone(&stage.program),
+            bindings: descriptors::bindings(&stage.resources, sets, constants)?,
+            sample_shading: stage.sample_shading,
+            alpha_to_coverage: stage.alpha_to_coverage,
+            alpha_to_one: stage.alpha_to_one,
+        })
+    };
+    Ok(Begin {
+        set: GaussianBegin {
+            state: fixed_state(state, gaussian)?,
+            camera: *camera,
+            further_cameras: further_cameras.to_vec(),
+            viewport: upright(state.viewport(gaussian).ok_or(DrawError::Viewport)?),
+            scissor: state.scissor(gaussian).ok_or(DrawError::Scissor)?,
+        },
+        resolve: gaussian.resolve.as_ref().map(resolve).transpose()?,
+    })
 }
 
-/// The packet that adds a draw to a sorted set.
+/// The packet that adds a draw to a sorted set, whose beginning is `set`.
 ///
 /// # Errors
 /// [`DrawError`] where a buffer that the draw needs is not bound.
@@ -60,6 +78,7 @@ pub(crate) fn append(
     state: &State,
     pipeline: &GraphicsPipeline,
     gaussian: &GaussianPipeline,
+    set: &GaussianBegin,
     draw: &DrawParameters,
     draw_index: u32,
 ) -> Result<Packet, DrawError> {
@@ -70,7 +89,7 @@ pub(crate) fn append(
         }
     };
     Ok(Packet::GaussianAppend(Box::new(GaussianAppend {
-        attributes: attributes(state, pipeline, sources)?,
+        attributes: attributes(state, pipeline, sources, set.state.sh_degree)?,
         indices: indices(state, draw)?,
         first: draw.first,
         count: draw.count,
@@ -225,12 +244,12 @@ fn fixed_state(
         .dynamic_states
         .apply(&gaussian.dynamic, &mut fixed)
         .map_err(DrawError::Dynamic)?;
-    let converted = fixed.draw_state();
-    Ok(Arc::new(GaussianState {
-        depth_stencil: converted.depth_stencil,
-        blend_constants: converted.blend_constants,
-        ..GaussianState::clone(&gaussian.state)
-    }))
+    let set = fixed.gaussian_state();
+    gaussian
+        .dynamic_rules
+        .check(&set)
+        .map_err(|error| DrawError::DynamicValue(error.to_string()))?;
+    Ok(Arc::new(set))
 }
 
 /// A Gaussian's pixels count from the upper left corner of the area that the viewport covers, so a negative
@@ -246,22 +265,54 @@ fn upright(viewport: Viewport) -> Viewport {
     }
 }
 
+/// The stream of a coefficient of a buffer of spherical harmonics.
+fn coefficient(buffer: &HarmonicsBuffer, number: u64) -> AttributeStream {
+    let range = &buffer.range;
+    let start = number.saturating_mul(buffer.coefficient_stride);
+    // Streams of one place are read together.
+    let (moved, offset) = match u32::try_from(start) {
+        Ok(offset) => (0, offset),
+        Err(_) => (start.min(range.size), 0),
+    };
+    AttributeStream {
+        buffer: BufferRange {
+            memory: Arc::clone(&range.memory),
+            offset: range.offset + moved,
+            size: range.size - moved,
+        },
+        stride: buffer.stride,
+        offset,
+        format: buffer.format,
+        instance_divisor: None,
+    }
+}
+
+/// The streams that fixed-function projection reads, with the harmonics of a degree.
 fn attributes(
     state: &State,
     pipeline: &GraphicsPipeline,
     sources: &GaussianAttributeSources,
+    degree: u32,
 ) -> Result<GaussianAttributes, DrawError> {
+    let count = (degree as usize + 1).pow(2);
     let stream = |source: &AttributeSource| attribute_stream(state, pipeline, source);
     Ok(GaussianAttributes {
         position: stream(&sources.position)?,
         scale: stream(&sources.scale)?,
         rotation: stream(&sources.rotation)?,
         opacity: stream(&sources.opacity)?,
-        spherical_harmonics: sources
-            .spherical_harmonics
-            .iter()
-            .map(stream)
-            .collect::<Result<_, _>>()?,
+        spherical_harmonics: match &sources.spherical_harmonics {
+            HarmonicsSource::Attributes(sources) => sources
+                .iter()
+                .take(count)
+                .map(stream)
+                .collect::<Result<_, _>>()?,
+            HarmonicsSource::Buffer => {
+                let bound = state.harmonics.as_ref().ok_or(DrawError::Harmonics)?;
+                (0..count as u64).map(|k| coefficient(bound, k)).collect()
+            }
+        },
+        activations: sources.activations,
         model: ModelAttributes {
             matrix: match &sources.model_matrix {
                 None => None,
