@@ -232,7 +232,7 @@ fn the_camera_may_come_from_a_uniform_buffer() {
     let buffer = scene.gpu.buffer_of(&bytes);
     let infos = [vk::DescriptorBufferInfo::default()
         .buffer(buffer.buffer)
-        .range(112)];
+        .range(128)];
     let write = vk::WriteDescriptorSet::default()
         .dst_set(camera_set.set)
         .dst_binding(3)

@@ -61,7 +61,7 @@ fn settings() -> [Values; 6] {
         (
             of_degree(0)
                 .order(GaussianOrderGAURAST::PER_PIXEL)
-                .alpha_floor(0.0)
+                .alpha_floor(0.001)
                 .alpha_ceiling(1.0)
                 .transmittance_floor(0.0),
             exact,

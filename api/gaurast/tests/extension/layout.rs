@@ -196,6 +196,6 @@ fn debug_prints_names_and_unknown_numbers() {
         "PER_PIXEL"
     );
     assert_eq!(format!("{:?}", GaussianOrderGAURAST::from_raw(77)), "77");
-    let flags = PipelineGaussianStateCreateFlagsGAURAST::from_raw(0b101);
-    assert_eq!(format!("{flags:?}"), "LOG_SCALE | 100");
+    let flags = PipelineGaussianStateCreateFlagsGAURAST::from_raw(0b1001);
+    assert_eq!(format!("{flags:?}"), "LOG_SCALE | 1000");
 }
