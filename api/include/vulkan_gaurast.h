@@ -2,7 +2,7 @@
 #define VULKAN_GAURAST_H_ 1
 
 /*
-** VK_GAURAST_gaussian_primitive_topology, revision 1: a 3D Gaussian is a primitive.
+** VK_GAURAST_gaussian_primitive_topology, revision 2: a 3D Gaussian is a primitive.
 **
 ** Include after <vulkan/vulkan.h>, or let this file do it. C11 and C++17. The meaning of every name is in
 ** spec/VK_GAURAST_gaussian_primitive_topology.adoc; the extension is not registered with Khronos.
@@ -19,7 +19,7 @@ extern "C" {
 #endif
 
 #define VK_GAURAST_gaussian_primitive_topology 1
-#define VK_GAURAST_GAUSSIAN_PRIMITIVE_TOPOLOGY_SPEC_VERSION 1
+#define VK_GAURAST_GAUSSIAN_PRIMITIVE_TOPOLOGY_SPEC_VERSION 2
 #define VK_GAURAST_GAUSSIAN_PRIMITIVE_TOPOLOGY_EXTENSION_NAME "VK_GAURAST_gaussian_primitive_topology"
 
 /* A location that the pipeline does not use. */
@@ -32,6 +32,16 @@ extern "C" {
 #define VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_STATE_CREATE_INFO_GAURAST ((VkStructureType)1000997002)
 #define VK_STRUCTURE_TYPE_GAUSSIAN_CAMERA_GAURAST ((VkStructureType)1000997003)
 #define VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_APPROXIMATION_STATE_CREATE_INFO_GAURAST ((VkStructureType)1000997004)
+#define VK_STRUCTURE_TYPE_GAUSSIAN_SPHERICAL_HARMONICS_BUFFER_GAURAST ((VkStructureType)1000997005)
+#define VK_DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST ((VkDynamicState)1000997000)
+#define VK_DYNAMIC_STATE_GAUSSIAN_ANTIALIASING_GAURAST ((VkDynamicState)1000997001)
+#define VK_DYNAMIC_STATE_GAUSSIAN_LOW_PASS_VARIANCE_GAURAST ((VkDynamicState)1000997002)
+#define VK_DYNAMIC_STATE_GAUSSIAN_ALPHA_FLOOR_GAURAST ((VkDynamicState)1000997003)
+#define VK_DYNAMIC_STATE_GAUSSIAN_ALPHA_CEILING_GAURAST ((VkDynamicState)1000997004)
+#define VK_DYNAMIC_STATE_GAUSSIAN_TRANSMITTANCE_FLOOR_GAURAST ((VkDynamicState)1000997005)
+#define VK_DYNAMIC_STATE_GAUSSIAN_SPHERICAL_HARMONICS_DEGREE_GAURAST ((VkDynamicState)1000997006)
+#define VK_DYNAMIC_STATE_GAUSSIAN_EXPONENTIAL_ERROR_GAURAST ((VkDynamicState)1000997007)
+#define VK_DYNAMIC_STATE_GAUSSIAN_CONTRIBUTION_BUDGET_GAURAST ((VkDynamicState)1000997008)
 
 typedef enum VkGaussianProjectionModeGAURAST {
     VK_GAUSSIAN_PROJECTION_MODE_FIXED_FUNCTION_GAURAST = 0,
@@ -86,7 +96,9 @@ typedef enum VkGaussianCameraModelGAURAST {
 } VkGaussianCameraModelGAURAST;
 
 typedef enum VkPipelineGaussianStateCreateFlagBitsGAURAST {
-    VK_PIPELINE_GAUSSIAN_STATE_CREATE_MERGE_DRAWS_BIT_GAURAST = 0x00000001,
+    VK_PIPELINE_GAUSSIAN_STATE_CREATE_LOG_SCALE_BIT_GAURAST = 0x00000001,
+    VK_PIPELINE_GAUSSIAN_STATE_CREATE_LOGIT_OPACITY_BIT_GAURAST = 0x00000002,
+    VK_PIPELINE_GAUSSIAN_STATE_CREATE_SPHERICAL_HARMONICS_BUFFER_BIT_GAURAST = 0x00000004,
     VK_PIPELINE_GAUSSIAN_STATE_CREATE_FLAG_BITS_MAX_ENUM_GAURAST = 0x7FFFFFFF
 } VkPipelineGaussianStateCreateFlagBitsGAURAST;
 typedef VkFlags VkPipelineGaussianStateCreateFlagsGAURAST;
@@ -113,14 +125,16 @@ typedef struct VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST {
     VkBool32           gaussianDepthStencil;
     VkBool32           gaussianMultisample;
     VkBool32           gaussianApproximation;
+    VkBool32           gaussianMultiview;
+    VkBool32           attributeActivation;
+    VkBool32           sphericalHarmonicsBuffer;
+    VkBool32           gaussianDynamicState;
 } VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST;
 
 typedef struct VkPhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST {
     VkStructureType       sType;
     void*                 pNext;
     VkExtent2D            tileSize;
-    uint32_t              rasterizerModuleCount;
-    uint32_t              processingElementCount;
     uint32_t              maxSphericalHarmonicsDegree;
     VkSampleCountFlags    gaussianSampleCounts;
     uint64_t              maxGaussiansPerDraw;
@@ -170,6 +184,7 @@ typedef struct VkPipelineGaussianStateCreateInfoGAURAST {
     VkGaussianCameraSourceGAURAST                cameraSource;
     uint32_t                                     cameraSet;
     uint32_t                                     cameraBinding;
+    uint32_t                                     cameraCount;
 } VkPipelineGaussianStateCreateInfoGAURAST;
 
 typedef struct VkPipelineGaussianApproximationStateCreateInfoGAURAST {
@@ -182,15 +197,25 @@ typedef struct VkPipelineGaussianApproximationStateCreateInfoGAURAST {
 typedef struct VkGaussianCameraGAURAST {
     VkStructureType                 sType;
     const void*                     pNext;
+    double                          eye[3];
     VkGaussianCameraModelGAURAST    model;
     float                           rotation[9];
-    double                          eye[3];
     float                           focalLength[2];
     float                           principalPoint[2];
+    float                           depthCoefficients[2];
     float                           nearPlane;
     float                           farPlane;
-    float                           depthCoefficients[2];
 } VkGaussianCameraGAURAST;
+
+typedef struct VkGaussianSphericalHarmonicsBufferGAURAST {
+    VkStructureType    sType;
+    const void*        pNext;
+    VkDeviceAddress    deviceAddress;
+    VkDeviceSize       size;
+    VkFormat           format;
+    uint32_t           stride;
+    VkDeviceSize       coefficientStride;
+} VkGaussianSphericalHarmonicsBufferGAURAST;
 
 typedef struct VkGaussianCameraDataGAURAST {
     double                          eye[3];
@@ -202,15 +227,63 @@ typedef struct VkGaussianCameraDataGAURAST {
     float                           depthCoefficients[2];
     float                           nearPlane;
     float                           farPlane;
+    uint32_t                        padding[4];
 } VkGaussianCameraDataGAURAST;
 
-typedef void (VKAPI_PTR *PFN_vkCmdSetGaussianCameraGAURAST)(VkCommandBuffer commandBuffer, const VkGaussianCameraGAURAST* pCamera);
+typedef void (VKAPI_PTR *PFN_vkCmdSetGaussianCamerasGAURAST)(VkCommandBuffer commandBuffer, uint32_t cameraCount, const VkGaussianCameraGAURAST* pCameras);
+typedef void (VKAPI_PTR *PFN_vkCmdBeginGaussianSetGAURAST)(VkCommandBuffer commandBuffer);
+typedef void (VKAPI_PTR *PFN_vkCmdEndGaussianSetGAURAST)(VkCommandBuffer commandBuffer);
+typedef void (VKAPI_PTR *PFN_vkCmdSetGaussianOrderGAURAST)(VkCommandBuffer commandBuffer, VkGaussianOrderGAURAST order);
+typedef void (VKAPI_PTR *PFN_vkCmdSetGaussianAntialiasingGAURAST)(VkCommandBuffer commandBuffer, VkGaussianAntialiasingGAURAST antialiasing);
+typedef void (VKAPI_PTR *PFN_vkCmdSetGaussianLowPassVarianceGAURAST)(VkCommandBuffer commandBuffer, float lowPassVariance);
+typedef void (VKAPI_PTR *PFN_vkCmdSetGaussianAlphaFloorGAURAST)(VkCommandBuffer commandBuffer, float alphaFloor);
+typedef void (VKAPI_PTR *PFN_vkCmdSetGaussianAlphaCeilingGAURAST)(VkCommandBuffer commandBuffer, float alphaCeiling);
+typedef void (VKAPI_PTR *PFN_vkCmdSetGaussianTransmittanceFloorGAURAST)(VkCommandBuffer commandBuffer, float transmittanceFloor);
+typedef void (VKAPI_PTR *PFN_vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST)(VkCommandBuffer commandBuffer, uint32_t sphericalHarmonicsDegree);
+typedef void (VKAPI_PTR *PFN_vkCmdSetGaussianExponentialErrorGAURAST)(VkCommandBuffer commandBuffer, float exponentialError);
+typedef void (VKAPI_PTR *PFN_vkCmdSetGaussianContributionBudgetGAURAST)(VkCommandBuffer commandBuffer, float contributionBudget);
+typedef void (VKAPI_PTR *PFN_vkCmdBindGaussianSphericalHarmonicsGAURAST)(VkCommandBuffer commandBuffer, const VkGaussianSphericalHarmonicsBufferGAURAST* pBuffer);
 
 #ifndef VK_NO_PROTOTYPES
 /* Not exported by the loader: get it with vkGetDeviceProcAddr. */
-VKAPI_ATTR void VKAPI_CALL vkCmdSetGaussianCameraGAURAST(
+VKAPI_ATTR void VKAPI_CALL vkCmdSetGaussianCamerasGAURAST(
     VkCommandBuffer                             commandBuffer,
-    const VkGaussianCameraGAURAST*              pCamera);
+    uint32_t                                    cameraCount,
+    const VkGaussianCameraGAURAST*              pCameras);
+VKAPI_ATTR void VKAPI_CALL vkCmdBeginGaussianSetGAURAST(
+    VkCommandBuffer                             commandBuffer);
+VKAPI_ATTR void VKAPI_CALL vkCmdEndGaussianSetGAURAST(
+    VkCommandBuffer                             commandBuffer);
+VKAPI_ATTR void VKAPI_CALL vkCmdSetGaussianOrderGAURAST(
+    VkCommandBuffer                             commandBuffer,
+    VkGaussianOrderGAURAST                      order);
+VKAPI_ATTR void VKAPI_CALL vkCmdSetGaussianAntialiasingGAURAST(
+    VkCommandBuffer                             commandBuffer,
+    VkGaussianAntialiasingGAURAST               antialiasing);
+VKAPI_ATTR void VKAPI_CALL vkCmdSetGaussianLowPassVarianceGAURAST(
+    VkCommandBuffer                             commandBuffer,
+    float                                       lowPassVariance);
+VKAPI_ATTR void VKAPI_CALL vkCmdSetGaussianAlphaFloorGAURAST(
+    VkCommandBuffer                             commandBuffer,
+    float                                       alphaFloor);
+VKAPI_ATTR void VKAPI_CALL vkCmdSetGaussianAlphaCeilingGAURAST(
+    VkCommandBuffer                             commandBuffer,
+    float                                       alphaCeiling);
+VKAPI_ATTR void VKAPI_CALL vkCmdSetGaussianTransmittanceFloorGAURAST(
+    VkCommandBuffer                             commandBuffer,
+    float                                       transmittanceFloor);
+VKAPI_ATTR void VKAPI_CALL vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST(
+    VkCommandBuffer                             commandBuffer,
+    uint32_t                                    sphericalHarmonicsDegree);
+VKAPI_ATTR void VKAPI_CALL vkCmdSetGaussianExponentialErrorGAURAST(
+    VkCommandBuffer                             commandBuffer,
+    float                                       exponentialError);
+VKAPI_ATTR void VKAPI_CALL vkCmdSetGaussianContributionBudgetGAURAST(
+    VkCommandBuffer                             commandBuffer,
+    float                                       contributionBudget);
+VKAPI_ATTR void VKAPI_CALL vkCmdBindGaussianSphericalHarmonicsGAURAST(
+    VkCommandBuffer                             commandBuffer,
+    const VkGaussianSphericalHarmonicsBufferGAURAST* pBuffer);
 #endif
 
 #ifdef __cplusplus

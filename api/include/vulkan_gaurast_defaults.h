@@ -21,6 +21,7 @@ static inline VkPipelineGaussianStateCreateInfoGAURAST vkGaussianStateDefaultsGA
     state.alphaFloor = 1.0f / 255.0f;
     state.alphaCeiling = 0.99f;
     state.transmittanceFloor = 1e-4f;
+    state.cameraCount = 1;
     return state;
 }
 

@@ -136,9 +136,9 @@ static void set_camera(VkCommandBuffer commands) {
     const double eye[3] = {0, 0, 0}, ahead[3] = {0, 0, 1}, up[3] = {0, -1, 0};
     VkGaussianCameraGAURAST camera =
         vkGaussianCameraLookAtGAURAST(eye, ahead, up, 2.0 * atan(0.5), SIZE, SIZE, 0.2f);
-    PFN_vkCmdSetGaussianCameraGAURAST set =
-        (PFN_vkCmdSetGaussianCameraGAURAST)vkGetDeviceProcAddr(device, "vkCmdSetGaussianCameraGAURAST");
-    set(commands, &camera);
+    PFN_vkCmdSetGaussianCamerasGAURAST set =
+        (PFN_vkCmdSetGaussianCamerasGAURAST)vkGetDeviceProcAddr(device, "vkCmdSetGaussianCamerasGAURAST");
+    set(commands, 1, &camera);
 }
 
 int main(void) {

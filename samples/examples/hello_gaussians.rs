@@ -127,7 +127,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         device.cmd_begin_rendering(commands[0], &info);
         device.cmd_bind_pipeline(commands[0], vk::PipelineBindPoint::GRAPHICS, pipeline);
         device.cmd_bind_vertex_buffers(commands[0], 0, &[buffer], &[0]);
-        extension.cmd_set_gaussian_camera(commands[0], &camera);
+        extension.cmd_set_gaussian_cameras(commands[0], &[camera]);
         device.cmd_draw(commands[0], GAUSSIANS.len() as u32, 1, 0, 0);
         device.cmd_end_rendering(commands[0]);
         device.cmd_pipeline_barrier(commands[0], DRAWN, Stage::HOST, no, &[to_host], &[], &[]);

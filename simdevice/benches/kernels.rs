@@ -107,6 +107,7 @@ fn append(gaussians: &[Gaussian], degree: u32) -> GaussianAppend {
             rotation: stream(6, Format::R32G32B32A32Sfloat),
             opacity: stream(10, Format::R32Sfloat),
             model: ModelAttributes::default(),
+            activations: Default::default(),
             spherical_harmonics: (0..(degree + 1).pow(2))
                 .map(|k| stream(11 + 3 * k, Format::R32G32B32Sfloat))
                 .collect(),
@@ -134,6 +135,7 @@ fn begin(degree: u32) -> GaussianBegin {
             sh_degree: degree,
             ..GaussianState::default()
         }),
+        further_cameras: Vec::new(),
         camera: Camera {
             model: CameraModel::Pinhole,
             rotation: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],

@@ -171,6 +171,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             rotation: stream(&shape, 12, Format::R32G32B32A32Sfloat),
             opacity: stream(&shape, 28, Format::R32Sfloat),
             model: ModelAttributes::default(),
+            activations: Default::default(),
             spherical_harmonics: (0..16)
                 .map(|k| stream(&harmonics, 12 * k, Format::R32G32B32Sfloat))
                 .collect(),
@@ -196,6 +197,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             },
             ..GaussianState::default()
         }),
+        further_cameras: Vec::new(),
         camera: Camera {
             model: CameraModel::Pinhole,
             rotation: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],

@@ -66,7 +66,8 @@ pub struct CommandProcessor {
     owner: Owner,
     counters: Counters,
     pass: Option<Pass>,
-    gaussians: Option<GaussianSet>,
+    /// The set that was begun and has not ended, once for each view.
+    gaussians: Vec<GaussianSet>,
     model: HardwareModel,
 }
 
@@ -80,7 +81,7 @@ impl CommandProcessor {
             owner,
             counters: Counters::default(),
             pass: None,
-            gaussians: None,
+            gaussians: Vec::new(),
             model: HardwareModel::new(owner),
         }
     }
@@ -98,7 +99,7 @@ impl CommandProcessor {
     /// Forgets a render pass and a set of Gaussians that were begun and not ended; what was not flushed is lost.
     pub fn reset(&mut self) {
         self.pass = None;
-        self.gaussians = None;
+        self.gaussians.clear();
     }
 
     /// Executes one packet.
@@ -144,39 +145,34 @@ impl CommandProcessor {
             Packet::GaussianBegin(begin) => {
                 let pass = self.pass.as_ref().ok_or(ExecutionError::OutsidePass)?;
                 self.outside_gaussian_set()?;
-                self.gaussians = Some(GaussianSet::begin(begin, pass.area(), pass.depth_format()));
+                let (area, depth) = (pass.area(), pass.depth_format());
+                let views = pass.views().enumerate();
+                self.gaussians = views
+                    .map(|(number, view)| {
+                        let view = (number, view.unwrap_or(0));
+                        GaussianSet::begin_view(begin, view, area, depth)
+                    })
+                    .collect();
                 Ok(())
             }
             Packet::GaussianAppend(append) => {
-                let set = self.gaussians.as_mut();
-                set.ok_or(ExecutionError::NoGaussianSet)?.append(append);
+                let sets = self.gaussian_set()?;
+                sets.iter_mut().for_each(|set| set.append(append));
                 Ok(())
             }
             Packet::GaussianAppendDraw(draw) => {
-                let set = self.gaussians.as_mut();
-                set.ok_or(ExecutionError::NoGaussianSet)?.append_draw(draw);
+                let sets = self.gaussian_set()?;
+                sets.iter_mut().for_each(|set| set.append_draw(draw));
                 Ok(())
             }
             Packet::GaussianFragmentStage(shader) => {
-                let set = self.gaussians.as_mut();
-                set.ok_or(ExecutionError::NoGaussianSet)?
-                    .shade_fragments(shader);
+                let sets = self.gaussian_set()?;
+                sets.iter_mut().for_each(|set| set.shade_fragments(shader));
                 Ok(())
             }
             Packet::GaussianEnd => {
-                let set = self.gaussians.take().ok_or(ExecutionError::NoGaussianSet)?;
-                let draw = gaussian::sort_and_bin(
-                    set,
-                    self.device.runtime(),
-                    self.device.caches(),
-                    &mut self.counters,
-                )?;
-                if let Some((recorder, record)) =
-                    self.device.runtime().recorder().zip(draw.record.as_ref())
-                {
-                    recorder.add_draw(self.owner, record);
-                }
-                self.draw(PassDraw::Gaussians(Box::new(draw)))
+                let sets = std::mem::take(self.gaussian_set()?);
+                sets.into_iter().try_for_each(|set| self.gaussians(set))
             }
             Packet::Dispatch(dispatch) => {
                 if self.pass.is_some() {
@@ -194,7 +190,7 @@ impl CommandProcessor {
             Packet::Barrier => self.flush(),
             Packet::EndRendering => {
                 let pass = self.pass.take().ok_or(ExecutionError::OutsidePass)?;
-                if self.gaussians.take().is_some() {
+                if !std::mem::take(&mut self.gaussians).is_empty() {
                     return Err(ExecutionError::GaussianSetOpen);
                 }
                 pass.end(self.device.runtime(), &mut self.counters)?;
@@ -246,10 +242,33 @@ impl CommandProcessor {
     }
 
     fn outside_gaussian_set(&self) -> Result<(), ExecutionError> {
-        match self.gaussians {
-            Some(_) => Err(ExecutionError::GaussianSetOpen),
-            None => Ok(()),
+        match self.gaussians.is_empty() {
+            true => Ok(()),
+            false => Err(ExecutionError::GaussianSetOpen),
         }
+    }
+
+    /// The set that was begun, once for each view.
+    fn gaussian_set(&mut self) -> Result<&mut Vec<GaussianSet>, ExecutionError> {
+        match self.gaussians.is_empty() {
+            true => Err(ExecutionError::NoGaussianSet),
+            false => Ok(&mut self.gaussians),
+        }
+    }
+
+    /// Sorts a set of a view and adds it to the pass.
+    fn gaussians(&mut self, set: GaussianSet) -> Result<(), ExecutionError> {
+        let draw = gaussian::sort_and_bin(
+            set,
+            self.device.runtime(),
+            self.device.caches(),
+            &mut self.counters,
+        )?;
+        let recorder = self.device.runtime().recorder();
+        if let Some((recorder, record)) = recorder.zip(draw.record.as_ref()) {
+            recorder.add_draw(self.owner, record);
+        }
+        self.draw(PassDraw::Gaussians(Box::new(draw)))
     }
 
     /// Does what belongs outside of render passes.
@@ -263,7 +282,6 @@ impl CommandProcessor {
 
     /// Adds a draw to the pass.
     fn draw(&mut self, draw: PassDraw) -> Result<(), ExecutionError> {
-        self.outside_gaussian_set()?;
         let pass = self.pass.as_mut().ok_or(ExecutionError::OutsidePass)?;
         Ok(pass.push(draw, self.device.runtime(), &mut self.counters)?)
     }
@@ -286,7 +304,6 @@ impl CommandProcessor {
     /// Points, lines or triangles of a view, or of the layers that they say, part by part.
     fn primitives_of_view(&mut self, draw: &Draw, view: Option<u32>) -> Result<(), ExecutionError> {
         let pass = self.pass.as_ref().ok_or(ExecutionError::OutsidePass)?;
-        self.outside_gaussian_set()?;
         let surface = Surface {
             area: pass.area(),
             layers: pass.layer_count(),

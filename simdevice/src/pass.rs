@@ -449,8 +449,7 @@ impl Flush<'_> {
                 Ready::Clear(clear) => {
                     tiles().for_each(|tile| self.clear(worker, clear, layer, &tile));
                 }
-                // Nothing says which layer a Gaussian is drawn to.
-                Ready::Gaussians(draw) if layer == 0 => {
+                Ready::Gaussians(draw) if layer == draw.layer() => {
                     let (buffers, fragments) = (&mut worker.buffers, &mut worker.gaussians);
                     for tile in tiles() {
                         let counters = &mut worker.counters;

@@ -14,6 +14,7 @@ mod rasterization_modes;
 mod recorded_work;
 mod reference;
 mod shaded;
+mod viewer;
 mod what_ifs;
 
 /// Trained scenes of the real data.

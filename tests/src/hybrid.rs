@@ -176,7 +176,7 @@ impl GaussianScene {
             );
             gaussian
                 .expect("a device that draws Gaussians")
-                .cmd_set_gaussian_camera(commands.raw, camera);
+                .cmd_set_gaussian_cameras(commands.raw, &[*camera]);
         }
         commands.draw(0..self.count);
     }

@@ -1,10 +1,7 @@
 //! Properties that pictures have whatever is drawn, on scenes made up at random.
 
 use ash::vk;
-use gaurast::vk::{
-    GaussianCameraGAURAST, GaussianOrderGAURAST, GaussianPrecisionGAURAST,
-    PipelineGaussianStateCreateFlagsGAURAST,
-};
+use gaurast::vk::{GaussianCameraGAURAST, GaussianOrderGAURAST, GaussianPrecisionGAURAST};
 use gaurast_runner::{Case, Variant, simd_levels};
 use gaurast_tests::contexts::{
     Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target, over,
@@ -233,8 +230,7 @@ proptest! {
     #[gaurast_runner::test]
     fn draws_may_be_merged(seed: u64, count in 1..150u32, cuts in prop::array::uniform2(0.0..1.0f64)) {
         let context = Context::embedded(&Settings::default());
-        let mut options = PipelineOptions::new(0);
-        options.state = options.state.flags(PipelineGaussianStateCreateFlagsGAURAST::MERGE_DRAWS);
+        let options = PipelineOptions::new(0);
         let mut gaussians = scene(seed, count as usize);
         gaussians.shuffle(&mut ChaCha8Rng::seed_from_u64(!seed));
         let whole = one(&context, &gaussians, &camera());
@@ -246,9 +242,11 @@ proptest! {
         context.run(|commands| {
             commands.pass(&target, &Pass::clear([0.0; 4]), || {
                 commands.bind(&pipeline, &on_device, &camera());
-                for [from, to] in [[0, cuts[0]], cuts, [cuts[1], count]] {
-                    commands.draw([to - from, 1, from, 0]);
-                }
+                commands.gaussian_set(|| {
+                    for [from, to] in [[0, cuts[0]], cuts, [cuts[1], count]] {
+                        commands.draw([to - from, 1, from, 0]);
+                    }
+                });
             });
         });
         prop_assert!(whole == target.read::<[f32; 4]>());

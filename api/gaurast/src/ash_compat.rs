@@ -66,13 +66,16 @@ macro_rules! vk_flags {
 
         impl core::fmt::Debug for $name {
             fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+                let named: &[(Self, &str)] = &[$((Self::$value, stringify!($value)),)*];
                 let mut unnamed = *self;
                 let mut separator = "";
-                $(if self.contains(Self::$value) {
-                    unnamed &= !Self::$value;
-                    write!(f, "{separator}{}", stringify!($value))?;
-                    separator = " | ";
-                })*
+                for &(bit, name) in named {
+                    if self.contains(bit) {
+                        unnamed &= !bit;
+                        write!(f, "{separator}{name}")?;
+                        separator = " | ";
+                    }
+                }
                 if unnamed.is_empty() {
                     Ok(())
                 } else {

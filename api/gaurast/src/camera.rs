@@ -63,6 +63,7 @@ impl From<&GaussianCameraGAURAST<'_>> for GaussianCameraDataGAURAST {
             depth_coefficients: camera.depth_coefficients,
             near_plane: camera.near_plane,
             far_plane: camera.far_plane,
+            padding: [0; 4],
         }
     }
 }

@@ -9,13 +9,23 @@ use core::ffi::{CStr, c_void};
 use ash::vk;
 
 use crate::ash_compat;
-use crate::vk::{GaussianCameraGAURAST, PFN_vkCmdSetGaussianCameraGAURAST};
+use crate::vk::{
+    GaussianAntialiasingGAURAST, GaussianCameraGAURAST, GaussianOrderGAURAST,
+    GaussianSphericalHarmonicsBufferGAURAST, PFN_vkCmdBeginGaussianSetGAURAST,
+    PFN_vkCmdBindGaussianSphericalHarmonicsGAURAST, PFN_vkCmdEndGaussianSetGAURAST,
+    PFN_vkCmdSetGaussianAlphaCeilingGAURAST, PFN_vkCmdSetGaussianAlphaFloorGAURAST,
+    PFN_vkCmdSetGaussianAntialiasingGAURAST, PFN_vkCmdSetGaussianCamerasGAURAST,
+    PFN_vkCmdSetGaussianContributionBudgetGAURAST, PFN_vkCmdSetGaussianExponentialErrorGAURAST,
+    PFN_vkCmdSetGaussianLowPassVarianceGAURAST, PFN_vkCmdSetGaussianOrderGAURAST,
+    PFN_vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST,
+    PFN_vkCmdSetGaussianTransmittanceFloorGAURAST,
+};
 
 /// The extension's name, for `ppEnabledExtensionNames`.
 pub const NAME: &CStr = c"VK_GAURAST_gaussian_primitive_topology";
 
 /// The revision of the extension that this crate describes.
-pub const SPEC_VERSION: u32 = 1;
+pub const SPEC_VERSION: u32 = 2;
 
 /// The extension number, which fixes the block of enum values: 1000000000 + (number - 1) * 1000.
 ///
@@ -52,33 +62,291 @@ impl Device {
         self.handle
     }
 
-    /// Sets the camera of the Gaussian draws that follow in the command buffer, for pipelines
+    /// Sets the cameras of the Gaussian draws that follow in the command buffer, for pipelines
     /// whose camera source is
     /// [`GaussianCameraSourceGAURAST::COMMAND`](crate::vk::GaussianCameraSourceGAURAST::COMMAND).
-    /// The camera is command buffer state: undefined when recording begins, kept when another
-    /// pipeline is bound, and not inherited by secondary command buffers. It is copied.
+    /// With one camera all views see through it; with more, view i of a pass with views sees
+    /// through camera i, and a pass without views through camera 0. Cameras are command buffer
+    /// state: undefined when recording begins, kept when another pipeline is bound, and not
+    /// inherited by secondary command buffers. They are copied, and those that were set before are
+    /// no longer there.
     ///
     /// # Safety
     ///
-    /// The valid usage of `vkCmdSetGaussianCameraGAURAST`, which the extension's specification states: handles belong to
+    /// The valid usage of `vkCmdSetGaussianCamerasGAURAST`, which the extension's specification states: handles belong to
     /// [`Self::device`], access to them is synchronised, and structures and their `p_next` chains are valid.
-    #[doc(alias = "vkCmdSetGaussianCameraGAURAST")]
+    #[doc(alias = "vkCmdSetGaussianCamerasGAURAST")]
     #[inline]
-    pub unsafe fn cmd_set_gaussian_camera(
+    pub unsafe fn cmd_set_gaussian_cameras(
         &self,
         command_buffer: vk::CommandBuffer,
-        camera: &GaussianCameraGAURAST<'_>,
+        cameras: &[GaussianCameraGAURAST<'_>],
     ) {
         // SAFETY: the caller keeps the function's contract; references are live.
-        unsafe { (self.fp.cmd_set_gaussian_camera_gaurast)(command_buffer, camera) }
+        unsafe {
+            (self.fp.cmd_set_gaussian_cameras_gaurast)(
+                command_buffer,
+                cameras.len() as u32,
+                cameras.as_ptr(),
+            )
+        }
+    }
+    /// Begins a sorted set: the Gaussians of all draws up to `vkCmdEndGaussianSetGAURAST` are
+    /// sorted and composited as those of one draw. Without it each draw is a sorted set of its
+    /// own. The set takes its state from its first draw, and the others must have the same. Needs
+    /// `mergedDraws`.
+    ///
+    /// # Safety
+    ///
+    /// The valid usage of `vkCmdBeginGaussianSetGAURAST`, which the extension's specification states: handles belong to
+    /// [`Self::device`], access to them is synchronised, and structures and their `p_next` chains are valid.
+    #[doc(alias = "vkCmdBeginGaussianSetGAURAST")]
+    #[inline]
+    pub unsafe fn cmd_begin_gaussian_set(&self, command_buffer: vk::CommandBuffer) {
+        // SAFETY: the caller keeps the function's contract; references are live.
+        unsafe { (self.fp.cmd_begin_gaussian_set_gaurast)(command_buffer) }
+    }
+    /// Ends the sorted set that `vkCmdBeginGaussianSetGAURAST` has begun: its Gaussians are drawn
+    /// here, after everything that was recorded before. It must be recorded in the subpass and in
+    /// the command buffer in which the set was begun.
+    ///
+    /// # Safety
+    ///
+    /// The valid usage of `vkCmdEndGaussianSetGAURAST`, which the extension's specification states: handles belong to
+    /// [`Self::device`], access to them is synchronised, and structures and their `p_next` chains are valid.
+    #[doc(alias = "vkCmdEndGaussianSetGAURAST")]
+    #[inline]
+    pub unsafe fn cmd_end_gaussian_set(&self, command_buffer: vk::CommandBuffer) {
+        // SAFETY: the caller keeps the function's contract; references are live.
+        unsafe { (self.fp.cmd_end_gaussian_set_gaurast)(command_buffer) }
+    }
+    /// Sets the order of Gaussian draws, for pipelines with
+    /// [`DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST`](crate::vk::DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST).
+    ///
+    /// # Safety
+    ///
+    /// The valid usage of `vkCmdSetGaussianOrderGAURAST`, which the extension's specification states: handles belong to
+    /// [`Self::device`], access to them is synchronised, and structures and their `p_next` chains are valid.
+    #[doc(alias = "vkCmdSetGaussianOrderGAURAST")]
+    #[inline]
+    pub unsafe fn cmd_set_gaussian_order(
+        &self,
+        command_buffer: vk::CommandBuffer,
+        order: GaussianOrderGAURAST,
+    ) {
+        // SAFETY: the caller keeps the function's contract; references are live.
+        unsafe { (self.fp.cmd_set_gaussian_order_gaurast)(command_buffer, order) }
+    }
+    /// Sets the anti-aliasing of Gaussian draws, for pipelines with
+    /// [`DYNAMIC_STATE_GAUSSIAN_ANTIALIASING_GAURAST`](crate::vk::DYNAMIC_STATE_GAUSSIAN_ANTIALIASING_GAURAST).
+    ///
+    /// # Safety
+    ///
+    /// The valid usage of `vkCmdSetGaussianAntialiasingGAURAST`, which the extension's specification states: handles belong to
+    /// [`Self::device`], access to them is synchronised, and structures and their `p_next` chains are valid.
+    #[doc(alias = "vkCmdSetGaussianAntialiasingGAURAST")]
+    #[inline]
+    pub unsafe fn cmd_set_gaussian_antialiasing(
+        &self,
+        command_buffer: vk::CommandBuffer,
+        antialiasing: GaussianAntialiasingGAURAST,
+    ) {
+        // SAFETY: the caller keeps the function's contract; references are live.
+        unsafe { (self.fp.cmd_set_gaussian_antialiasing_gaurast)(command_buffer, antialiasing) }
+    }
+    /// Sets the low-pass variance of Gaussian draws, in px^2, for pipelines with
+    /// [`DYNAMIC_STATE_GAUSSIAN_LOW_PASS_VARIANCE_GAURAST`](crate::vk::DYNAMIC_STATE_GAUSSIAN_LOW_PASS_VARIANCE_GAURAST).
+    ///
+    /// # Safety
+    ///
+    /// The valid usage of `vkCmdSetGaussianLowPassVarianceGAURAST`, which the extension's specification states: handles belong to
+    /// [`Self::device`], access to them is synchronised, and structures and their `p_next` chains are valid.
+    #[doc(alias = "vkCmdSetGaussianLowPassVarianceGAURAST")]
+    #[inline]
+    pub unsafe fn cmd_set_gaussian_low_pass_variance(
+        &self,
+        command_buffer: vk::CommandBuffer,
+        low_pass_variance: f32,
+    ) {
+        // SAFETY: the caller keeps the function's contract; references are live.
+        unsafe {
+            (self.fp.cmd_set_gaussian_low_pass_variance_gaurast)(command_buffer, low_pass_variance)
+        }
+    }
+    /// Sets the least alpha of Gaussian draws that contributes, for pipelines with
+    /// [`DYNAMIC_STATE_GAUSSIAN_ALPHA_FLOOR_GAURAST`](crate::vk::DYNAMIC_STATE_GAUSSIAN_ALPHA_FLOOR_GAURAST).
+    ///
+    /// # Safety
+    ///
+    /// The valid usage of `vkCmdSetGaussianAlphaFloorGAURAST`, which the extension's specification states: handles belong to
+    /// [`Self::device`], access to them is synchronised, and structures and their `p_next` chains are valid.
+    #[doc(alias = "vkCmdSetGaussianAlphaFloorGAURAST")]
+    #[inline]
+    pub unsafe fn cmd_set_gaussian_alpha_floor(
+        &self,
+        command_buffer: vk::CommandBuffer,
+        alpha_floor: f32,
+    ) {
+        // SAFETY: the caller keeps the function's contract; references are live.
+        unsafe { (self.fp.cmd_set_gaussian_alpha_floor_gaurast)(command_buffer, alpha_floor) }
+    }
+    /// Sets the greatest alpha of Gaussian draws, for pipelines with
+    /// [`DYNAMIC_STATE_GAUSSIAN_ALPHA_CEILING_GAURAST`](crate::vk::DYNAMIC_STATE_GAUSSIAN_ALPHA_CEILING_GAURAST).
+    ///
+    /// # Safety
+    ///
+    /// The valid usage of `vkCmdSetGaussianAlphaCeilingGAURAST`, which the extension's specification states: handles belong to
+    /// [`Self::device`], access to them is synchronised, and structures and their `p_next` chains are valid.
+    #[doc(alias = "vkCmdSetGaussianAlphaCeilingGAURAST")]
+    #[inline]
+    pub unsafe fn cmd_set_gaussian_alpha_ceiling(
+        &self,
+        command_buffer: vk::CommandBuffer,
+        alpha_ceiling: f32,
+    ) {
+        // SAFETY: the caller keeps the function's contract; references are live.
+        unsafe { (self.fp.cmd_set_gaussian_alpha_ceiling_gaurast)(command_buffer, alpha_ceiling) }
+    }
+    /// Sets the transmittance below which a pixel of Gaussian draws is finished, for pipelines
+    /// with
+    /// [`DYNAMIC_STATE_GAUSSIAN_TRANSMITTANCE_FLOOR_GAURAST`](crate::vk::DYNAMIC_STATE_GAUSSIAN_TRANSMITTANCE_FLOOR_GAURAST).
+    ///
+    /// # Safety
+    ///
+    /// The valid usage of `vkCmdSetGaussianTransmittanceFloorGAURAST`, which the extension's specification states: handles belong to
+    /// [`Self::device`], access to them is synchronised, and structures and their `p_next` chains are valid.
+    #[doc(alias = "vkCmdSetGaussianTransmittanceFloorGAURAST")]
+    #[inline]
+    pub unsafe fn cmd_set_gaussian_transmittance_floor(
+        &self,
+        command_buffer: vk::CommandBuffer,
+        transmittance_floor: f32,
+    ) {
+        // SAFETY: the caller keeps the function's contract; references are live.
+        unsafe {
+            (self.fp.cmd_set_gaussian_transmittance_floor_gaurast)(
+                command_buffer,
+                transmittance_floor,
+            )
+        }
+    }
+    /// Sets the degree of spherical harmonics that Gaussian draws evaluate; at most that of the
+    /// pipeline, which says how many coefficients there are, for pipelines with
+    /// [`DYNAMIC_STATE_GAUSSIAN_SPHERICAL_HARMONICS_DEGREE_GAURAST`](crate::vk::DYNAMIC_STATE_GAUSSIAN_SPHERICAL_HARMONICS_DEGREE_GAURAST).
+    ///
+    /// # Safety
+    ///
+    /// The valid usage of `vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST`, which the extension's specification states: handles belong to
+    /// [`Self::device`], access to them is synchronised, and structures and their `p_next` chains are valid.
+    #[doc(alias = "vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST")]
+    #[inline]
+    pub unsafe fn cmd_set_gaussian_spherical_harmonics_degree(
+        &self,
+        command_buffer: vk::CommandBuffer,
+        spherical_harmonics_degree: u32,
+    ) {
+        // SAFETY: the caller keeps the function's contract; references are live.
+        unsafe {
+            (self.fp.cmd_set_gaussian_spherical_harmonics_degree_gaurast)(
+                command_buffer,
+                spherical_harmonics_degree,
+            )
+        }
+    }
+    /// Sets the greatest relative error of the exponential in Gaussian draws, for pipelines with
+    /// [`DYNAMIC_STATE_GAUSSIAN_EXPONENTIAL_ERROR_GAURAST`](crate::vk::DYNAMIC_STATE_GAUSSIAN_EXPONENTIAL_ERROR_GAURAST).
+    ///
+    /// # Safety
+    ///
+    /// The valid usage of `vkCmdSetGaussianExponentialErrorGAURAST`, which the extension's specification states: handles belong to
+    /// [`Self::device`], access to them is synchronised, and structures and their `p_next` chains are valid.
+    #[doc(alias = "vkCmdSetGaussianExponentialErrorGAURAST")]
+    #[inline]
+    pub unsafe fn cmd_set_gaussian_exponential_error(
+        &self,
+        command_buffer: vk::CommandBuffer,
+        exponential_error: f32,
+    ) {
+        // SAFETY: the caller keeps the function's contract; references are live.
+        unsafe {
+            (self.fp.cmd_set_gaussian_exponential_error_gaurast)(command_buffer, exponential_error)
+        }
+    }
+    /// Sets the greatest sum of the contributions that Gaussian draws leave out at a pixel, for
+    /// pipelines with
+    /// [`DYNAMIC_STATE_GAUSSIAN_CONTRIBUTION_BUDGET_GAURAST`](crate::vk::DYNAMIC_STATE_GAUSSIAN_CONTRIBUTION_BUDGET_GAURAST).
+    ///
+    /// # Safety
+    ///
+    /// The valid usage of `vkCmdSetGaussianContributionBudgetGAURAST`, which the extension's specification states: handles belong to
+    /// [`Self::device`], access to them is synchronised, and structures and their `p_next` chains are valid.
+    #[doc(alias = "vkCmdSetGaussianContributionBudgetGAURAST")]
+    #[inline]
+    pub unsafe fn cmd_set_gaussian_contribution_budget(
+        &self,
+        command_buffer: vk::CommandBuffer,
+        contribution_budget: f32,
+    ) {
+        // SAFETY: the caller keeps the function's contract; references are live.
+        unsafe {
+            (self.fp.cmd_set_gaussian_contribution_budget_gaurast)(
+                command_buffer,
+                contribution_budget,
+            )
+        }
+    }
+    /// Binds the buffer that the spherical harmonics of the Gaussian draws that follow are read
+    /// from, for pipelines with
+    /// [`PipelineGaussianStateCreateFlagsGAURAST::SPHERICAL_HARMONICS_BUFFER`](crate::vk::PipelineGaussianStateCreateFlagsGAURAST::SPHERICAL_HARMONICS_BUFFER).
+    /// It is command buffer state, as vertex buffers are.
+    ///
+    /// # Safety
+    ///
+    /// The valid usage of `vkCmdBindGaussianSphericalHarmonicsGAURAST`, which the extension's specification states: handles belong to
+    /// [`Self::device`], access to them is synchronised, and structures and their `p_next` chains are valid.
+    #[doc(alias = "vkCmdBindGaussianSphericalHarmonicsGAURAST")]
+    #[inline]
+    pub unsafe fn cmd_bind_gaussian_spherical_harmonics(
+        &self,
+        command_buffer: vk::CommandBuffer,
+        buffer: &GaussianSphericalHarmonicsBufferGAURAST<'_>,
+    ) {
+        // SAFETY: the caller keeps the function's contract; references are live.
+        unsafe { (self.fp.cmd_bind_gaussian_spherical_harmonics_gaurast)(command_buffer, buffer) }
     }
 }
 
 /// Raw VK_GAURAST_gaussian_primitive_topology device-level function pointers.
 #[derive(Clone)]
 pub struct DeviceFn {
-    /// `vkCmdSetGaussianCameraGAURAST`.
-    pub cmd_set_gaussian_camera_gaurast: PFN_vkCmdSetGaussianCameraGAURAST,
+    /// `vkCmdSetGaussianCamerasGAURAST`.
+    pub cmd_set_gaussian_cameras_gaurast: PFN_vkCmdSetGaussianCamerasGAURAST,
+    /// `vkCmdBeginGaussianSetGAURAST`.
+    pub cmd_begin_gaussian_set_gaurast: PFN_vkCmdBeginGaussianSetGAURAST,
+    /// `vkCmdEndGaussianSetGAURAST`.
+    pub cmd_end_gaussian_set_gaurast: PFN_vkCmdEndGaussianSetGAURAST,
+    /// `vkCmdSetGaussianOrderGAURAST`.
+    pub cmd_set_gaussian_order_gaurast: PFN_vkCmdSetGaussianOrderGAURAST,
+    /// `vkCmdSetGaussianAntialiasingGAURAST`.
+    pub cmd_set_gaussian_antialiasing_gaurast: PFN_vkCmdSetGaussianAntialiasingGAURAST,
+    /// `vkCmdSetGaussianLowPassVarianceGAURAST`.
+    pub cmd_set_gaussian_low_pass_variance_gaurast: PFN_vkCmdSetGaussianLowPassVarianceGAURAST,
+    /// `vkCmdSetGaussianAlphaFloorGAURAST`.
+    pub cmd_set_gaussian_alpha_floor_gaurast: PFN_vkCmdSetGaussianAlphaFloorGAURAST,
+    /// `vkCmdSetGaussianAlphaCeilingGAURAST`.
+    pub cmd_set_gaussian_alpha_ceiling_gaurast: PFN_vkCmdSetGaussianAlphaCeilingGAURAST,
+    /// `vkCmdSetGaussianTransmittanceFloorGAURAST`.
+    pub cmd_set_gaussian_transmittance_floor_gaurast: PFN_vkCmdSetGaussianTransmittanceFloorGAURAST,
+    /// `vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST`.
+    pub cmd_set_gaussian_spherical_harmonics_degree_gaurast:
+        PFN_vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST,
+    /// `vkCmdSetGaussianExponentialErrorGAURAST`.
+    pub cmd_set_gaussian_exponential_error_gaurast: PFN_vkCmdSetGaussianExponentialErrorGAURAST,
+    /// `vkCmdSetGaussianContributionBudgetGAURAST`.
+    pub cmd_set_gaussian_contribution_budget_gaurast: PFN_vkCmdSetGaussianContributionBudgetGAURAST,
+    /// `vkCmdBindGaussianSphericalHarmonicsGAURAST`.
+    pub cmd_bind_gaussian_spherical_harmonics_gaurast:
+        PFN_vkCmdBindGaussianSphericalHarmonicsGAURAST,
 }
 
 impl DeviceFn {
@@ -88,22 +356,255 @@ impl DeviceFn {
     /// What `load` returns must be null or the function of that name.
     pub fn load<F: FnMut(&CStr) -> *const c_void>(mut load: F) -> Self {
         Self {
-            cmd_set_gaussian_camera_gaurast: {
-                unsafe extern "system" fn cmd_set_gaussian_camera_gaurast(
+            cmd_set_gaussian_cameras_gaurast: {
+                unsafe extern "system" fn cmd_set_gaussian_cameras_gaurast(
                     _command_buffer: vk::CommandBuffer,
-                    _p_camera: *const GaussianCameraGAURAST<'_>,
+                    _camera_count: u32,
+                    _p_cameras: *const GaussianCameraGAURAST<'_>,
                 ) {
-                    panic!("Unable to load cmd_set_gaussian_camera_gaurast")
+                    panic!("Unable to load cmd_set_gaussian_cameras_gaurast")
                 }
-                let function = load(c"vkCmdSetGaussianCameraGAURAST");
+                let function = load(c"vkCmdSetGaussianCamerasGAURAST");
                 if function.is_null() {
-                    cmd_set_gaussian_camera_gaurast
+                    cmd_set_gaussian_cameras_gaurast
                 } else {
                     // SAFETY: the loader returns the function of that name, which has this type.
                     unsafe {
-                        core::mem::transmute::<*const c_void, PFN_vkCmdSetGaussianCameraGAURAST>(
+                        core::mem::transmute::<*const c_void, PFN_vkCmdSetGaussianCamerasGAURAST>(
                             function,
                         )
+                    }
+                }
+            },
+            cmd_begin_gaussian_set_gaurast: {
+                unsafe extern "system" fn cmd_begin_gaussian_set_gaurast(
+                    _command_buffer: vk::CommandBuffer,
+                ) {
+                    panic!("Unable to load cmd_begin_gaussian_set_gaurast")
+                }
+                let function = load(c"vkCmdBeginGaussianSetGAURAST");
+                if function.is_null() {
+                    cmd_begin_gaussian_set_gaurast
+                } else {
+                    // SAFETY: the loader returns the function of that name, which has this type.
+                    unsafe {
+                        core::mem::transmute::<*const c_void, PFN_vkCmdBeginGaussianSetGAURAST>(
+                            function,
+                        )
+                    }
+                }
+            },
+            cmd_end_gaussian_set_gaurast: {
+                unsafe extern "system" fn cmd_end_gaussian_set_gaurast(
+                    _command_buffer: vk::CommandBuffer,
+                ) {
+                    panic!("Unable to load cmd_end_gaussian_set_gaurast")
+                }
+                let function = load(c"vkCmdEndGaussianSetGAURAST");
+                if function.is_null() {
+                    cmd_end_gaussian_set_gaurast
+                } else {
+                    // SAFETY: the loader returns the function of that name, which has this type.
+                    unsafe {
+                        core::mem::transmute::<*const c_void, PFN_vkCmdEndGaussianSetGAURAST>(
+                            function,
+                        )
+                    }
+                }
+            },
+            cmd_set_gaussian_order_gaurast: {
+                unsafe extern "system" fn cmd_set_gaussian_order_gaurast(
+                    _command_buffer: vk::CommandBuffer,
+                    _order: GaussianOrderGAURAST,
+                ) {
+                    panic!("Unable to load cmd_set_gaussian_order_gaurast")
+                }
+                let function = load(c"vkCmdSetGaussianOrderGAURAST");
+                if function.is_null() {
+                    cmd_set_gaussian_order_gaurast
+                } else {
+                    // SAFETY: the loader returns the function of that name, which has this type.
+                    unsafe {
+                        core::mem::transmute::<*const c_void, PFN_vkCmdSetGaussianOrderGAURAST>(
+                            function,
+                        )
+                    }
+                }
+            },
+            cmd_set_gaussian_antialiasing_gaurast: {
+                unsafe extern "system" fn cmd_set_gaussian_antialiasing_gaurast(
+                    _command_buffer: vk::CommandBuffer,
+                    _antialiasing: GaussianAntialiasingGAURAST,
+                ) {
+                    panic!("Unable to load cmd_set_gaussian_antialiasing_gaurast")
+                }
+                let function = load(c"vkCmdSetGaussianAntialiasingGAURAST");
+                if function.is_null() {
+                    cmd_set_gaussian_antialiasing_gaurast
+                } else {
+                    // SAFETY: the loader returns the function of that name, which has this type.
+                    unsafe {
+                        core::mem::transmute::<*const c_void, PFN_vkCmdSetGaussianAntialiasingGAURAST>(
+                            function,
+                        )
+                    }
+                }
+            },
+            cmd_set_gaussian_low_pass_variance_gaurast: {
+                unsafe extern "system" fn cmd_set_gaussian_low_pass_variance_gaurast(
+                    _command_buffer: vk::CommandBuffer,
+                    _low_pass_variance: f32,
+                ) {
+                    panic!("Unable to load cmd_set_gaussian_low_pass_variance_gaurast")
+                }
+                let function = load(c"vkCmdSetGaussianLowPassVarianceGAURAST");
+                if function.is_null() {
+                    cmd_set_gaussian_low_pass_variance_gaurast
+                } else {
+                    // SAFETY: the loader returns the function of that name, which has this type.
+                    unsafe {
+                        core::mem::transmute::<
+                            *const c_void,
+                            PFN_vkCmdSetGaussianLowPassVarianceGAURAST,
+                        >(function)
+                    }
+                }
+            },
+            cmd_set_gaussian_alpha_floor_gaurast: {
+                unsafe extern "system" fn cmd_set_gaussian_alpha_floor_gaurast(
+                    _command_buffer: vk::CommandBuffer,
+                    _alpha_floor: f32,
+                ) {
+                    panic!("Unable to load cmd_set_gaussian_alpha_floor_gaurast")
+                }
+                let function = load(c"vkCmdSetGaussianAlphaFloorGAURAST");
+                if function.is_null() {
+                    cmd_set_gaussian_alpha_floor_gaurast
+                } else {
+                    // SAFETY: the loader returns the function of that name, which has this type.
+                    unsafe {
+                        core::mem::transmute::<*const c_void, PFN_vkCmdSetGaussianAlphaFloorGAURAST>(
+                            function,
+                        )
+                    }
+                }
+            },
+            cmd_set_gaussian_alpha_ceiling_gaurast: {
+                unsafe extern "system" fn cmd_set_gaussian_alpha_ceiling_gaurast(
+                    _command_buffer: vk::CommandBuffer,
+                    _alpha_ceiling: f32,
+                ) {
+                    panic!("Unable to load cmd_set_gaussian_alpha_ceiling_gaurast")
+                }
+                let function = load(c"vkCmdSetGaussianAlphaCeilingGAURAST");
+                if function.is_null() {
+                    cmd_set_gaussian_alpha_ceiling_gaurast
+                } else {
+                    // SAFETY: the loader returns the function of that name, which has this type.
+                    unsafe {
+                        core::mem::transmute::<*const c_void, PFN_vkCmdSetGaussianAlphaCeilingGAURAST>(
+                            function,
+                        )
+                    }
+                }
+            },
+            cmd_set_gaussian_transmittance_floor_gaurast: {
+                unsafe extern "system" fn cmd_set_gaussian_transmittance_floor_gaurast(
+                    _command_buffer: vk::CommandBuffer,
+                    _transmittance_floor: f32,
+                ) {
+                    panic!("Unable to load cmd_set_gaussian_transmittance_floor_gaurast")
+                }
+                let function = load(c"vkCmdSetGaussianTransmittanceFloorGAURAST");
+                if function.is_null() {
+                    cmd_set_gaussian_transmittance_floor_gaurast
+                } else {
+                    // SAFETY: the loader returns the function of that name, which has this type.
+                    unsafe {
+                        core::mem::transmute::<
+                            *const c_void,
+                            PFN_vkCmdSetGaussianTransmittanceFloorGAURAST,
+                        >(function)
+                    }
+                }
+            },
+            cmd_set_gaussian_spherical_harmonics_degree_gaurast: {
+                unsafe extern "system" fn cmd_set_gaussian_spherical_harmonics_degree_gaurast(
+                    _command_buffer: vk::CommandBuffer,
+                    _spherical_harmonics_degree: u32,
+                ) {
+                    panic!("Unable to load cmd_set_gaussian_spherical_harmonics_degree_gaurast")
+                }
+                let function = load(c"vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST");
+                if function.is_null() {
+                    cmd_set_gaussian_spherical_harmonics_degree_gaurast
+                } else {
+                    // SAFETY: the loader returns the function of that name, which has this type.
+                    unsafe {
+                        core::mem::transmute::<
+                            *const c_void,
+                            PFN_vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST,
+                        >(function)
+                    }
+                }
+            },
+            cmd_set_gaussian_exponential_error_gaurast: {
+                unsafe extern "system" fn cmd_set_gaussian_exponential_error_gaurast(
+                    _command_buffer: vk::CommandBuffer,
+                    _exponential_error: f32,
+                ) {
+                    panic!("Unable to load cmd_set_gaussian_exponential_error_gaurast")
+                }
+                let function = load(c"vkCmdSetGaussianExponentialErrorGAURAST");
+                if function.is_null() {
+                    cmd_set_gaussian_exponential_error_gaurast
+                } else {
+                    // SAFETY: the loader returns the function of that name, which has this type.
+                    unsafe {
+                        core::mem::transmute::<
+                            *const c_void,
+                            PFN_vkCmdSetGaussianExponentialErrorGAURAST,
+                        >(function)
+                    }
+                }
+            },
+            cmd_set_gaussian_contribution_budget_gaurast: {
+                unsafe extern "system" fn cmd_set_gaussian_contribution_budget_gaurast(
+                    _command_buffer: vk::CommandBuffer,
+                    _contribution_budget: f32,
+                ) {
+                    panic!("Unable to load cmd_set_gaussian_contribution_budget_gaurast")
+                }
+                let function = load(c"vkCmdSetGaussianContributionBudgetGAURAST");
+                if function.is_null() {
+                    cmd_set_gaussian_contribution_budget_gaurast
+                } else {
+                    // SAFETY: the loader returns the function of that name, which has this type.
+                    unsafe {
+                        core::mem::transmute::<
+                            *const c_void,
+                            PFN_vkCmdSetGaussianContributionBudgetGAURAST,
+                        >(function)
+                    }
+                }
+            },
+            cmd_bind_gaussian_spherical_harmonics_gaurast: {
+                unsafe extern "system" fn cmd_bind_gaussian_spherical_harmonics_gaurast(
+                    _command_buffer: vk::CommandBuffer,
+                    _p_buffer: *const GaussianSphericalHarmonicsBufferGAURAST<'_>,
+                ) {
+                    panic!("Unable to load cmd_bind_gaussian_spherical_harmonics_gaurast")
+                }
+                let function = load(c"vkCmdBindGaussianSphericalHarmonicsGAURAST");
+                if function.is_null() {
+                    cmd_bind_gaussian_spherical_harmonics_gaurast
+                } else {
+                    // SAFETY: the loader returns the function of that name, which has this type.
+                    unsafe {
+                        core::mem::transmute::<
+                            *const c_void,
+                            PFN_vkCmdBindGaussianSphericalHarmonicsGAURAST,
+                        >(function)
                     }
                 }
             },

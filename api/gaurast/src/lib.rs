@@ -44,7 +44,7 @@
 //!     &view, &projection, [1280.0, 720.0],
 //! )?;
 //! # // SAFETY: never run.
-//! unsafe { functions.cmd_set_gaussian_camera(command_buffer, &camera) };
+//! unsafe { functions.cmd_set_gaussian_cameras(command_buffer, &[camera]) };
 //! # Ok(())
 //! # }
 //! ```

@@ -70,7 +70,7 @@ impl Recorder<'_> {
             raw.cmd_bind_vertex_buffers(commands, 0, &buffers, &[0; BINDINGS]);
             raw.cmd_set_viewport(commands, 0, &[viewport]);
             raw.cmd_set_scissor(commands, 0, &[area]);
-            (self.gaussian).cmd_set_gaussian_camera(commands, &vulkan);
+            (self.gaussian).cmd_set_gaussian_cameras(commands, &[vulkan]);
             raw.cmd_draw(commands, scene.count, 1, 0, 0);
             raw.cmd_end_rendering(commands);
         }

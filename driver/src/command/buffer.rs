@@ -116,6 +116,11 @@ impl CommandBuffer {
         self.recorder.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// The device that it is of.
+    pub(super) fn device(&self) -> &Device {
+        &self.device
+    }
+
     /// Tells if it is a secondary command buffer.
     pub(crate) fn is_secondary(&self) -> bool {
         self.level == vk::CommandBufferLevel::SECONDARY
@@ -190,6 +195,8 @@ pub(crate) struct Recorder {
     finished: Option<Arc<Vec<Command>>>,
     /// The render pass, or dynamic rendering, that commands are recorded within.
     pub(super) pass: Option<RenderScope>,
+    /// True within a set of Gaussian draws.
+    pub(super) has_gaussian_set: bool,
     error: Option<Error>,
     pending: Arc<AtomicUsize>,
 }
@@ -221,6 +228,7 @@ impl Recorder {
             commands: Vec::new(),
             finished: None,
             pass: None,
+            has_gaussian_set: false,
             error: None,
             pending: Arc::default(),
         }
@@ -293,6 +301,7 @@ impl Recorder {
         if let Some(error) = self.error.take() {
             return Err(error);
         }
+        self.require_no_gaussian_set()?;
         if !matches!(self.pass, None | Some(RenderScope::Inherited { .. })) {
             return Err(Error::usage(
                 "VUID-vkEndCommandBuffer-commandBuffer-00060",
@@ -568,6 +577,7 @@ pub(crate) fn cmd_execute_commands(
         ));
     }
     command_buffer.record("vkCmdExecuteCommands", |recorder| {
+        recorder.require_no_gaussian_set()?;
         let mut contents = host::with_capacity(command_buffers.len());
         for secondary in command_buffers {
             if !secondary.is_secondary() {

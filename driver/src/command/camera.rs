@@ -1,8 +1,9 @@
-//! The camera of Gaussian draws.
+//! The cameras of Gaussian draws.
 
 use super::Command;
 use super::buffer::Recorder;
 use crate::abi::error::Error;
+use crate::physical_device::limits;
 use gaurast::vk::{GaussianCameraDataGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST};
 use simdevice::packet::BufferRange;
 use simdevice::state::gaussian::{Camera, CameraModel};
@@ -38,30 +39,45 @@ fn camera(camera: &GaussianCameraGAURAST) -> Result<Camera, Error> {
     })
 }
 
-#[doc(alias = "vkCmdSetGaussianCameraGAURAST")]
-pub(crate) fn cmd_set_gaussian_camera(
+#[doc(alias = "vkCmdSetGaussianCamerasGAURAST")]
+pub(crate) fn cmd_set_gaussian_cameras(
     recorder: &mut Recorder,
-    camera: &GaussianCameraGAURAST<'_>,
+    cameras: &[GaussianCameraGAURAST<'_>],
 ) -> Result<(), Error> {
-    let camera = self::camera(camera)?;
-    recorder.push(Command::SetCamera(Box::new(camera)));
+    let most = limits::properties().max_multiview_view_count as usize;
+    if cameras.is_empty() || cameras.len() > most {
+        return Err(Error::usage(
+            "VUID-vkCmdSetGaussianCamerasGAURAST-cameraCount-limit",
+            format!(
+                "cameraCount is {}, but must be at least 1 and at most maxMultiviewViewCount ({most})",
+                cameras.len()
+            ),
+        ));
+    }
+    let cameras = cameras.iter().map(camera).collect::<Result<_, _>>()?;
+    recorder.push(Command::SetCameras(cameras));
     Ok(())
 }
 
 /// Bytes of a `VkGaussianCameraDataGAURAST`.
 const DATA_BYTES: usize = size_of::<GaussianCameraDataGAURAST>();
 
-/// Reads a `VkGaussianCameraDataGAURAST` from the start of a uniform buffer.
+/// Reads the `VkGaussianCameraDataGAURAST` of a number from a uniform buffer.
 ///
 /// # Errors
 /// As [`camera`]; [`Error::InvalidUsage`] if the buffer is too short.
-pub(super) fn read(range: &BufferRange) -> Result<Camera, Error> {
+pub(super) fn read(range: &BufferRange, number: usize) -> Result<Camera, Error> {
     let mut words = [0u32; DATA_BYTES / 4];
-    let inside = range.size >= DATA_BYTES as u64;
-    if !inside || range.memory.read(range.offset, &mut words).is_err() {
+    let start = (number * DATA_BYTES) as u64;
+    let inside = range.size >= start + DATA_BYTES as u64;
+    let place = range.offset.saturating_add(start);
+    if !inside || range.memory.read(place, &mut words).is_err() {
         return Err(Error::usage(
             "VUID-VkPipelineGaussianStateCreateInfoGAURAST-cameraBinding-layout",
-            format!("it has {} bytes, and a camera {DATA_BYTES}", range.size),
+            format!(
+                "it has {} bytes, and camera {number} begins at byte {start} and takes {DATA_BYTES}",
+                range.size
+            ),
         ));
     }
     let float = |word: usize| f32::from_bits(words[word]);
@@ -194,16 +210,21 @@ mod tests {
                 .map(f32::to_le_bytes)
                 .concat(),
         );
+        bytes.extend([0xFF; 16]);
         assert_eq!(bytes.len(), DATA_BYTES);
         let memory = Allocation::new_zeroed(4096).unwrap();
-        memory.write(64, &bytes).unwrap();
         let range = |size| BufferRange {
             memory: memory.clone(),
             offset: 64,
             size,
         };
-        assert_eq!(read(&range(112)).unwrap(), camera(&set).unwrap());
-        assert!(read(&range(111)).is_err());
+        for number in [0, 1, 5] {
+            memory.write(64 + 128 * number, &bytes).unwrap();
+            let end = 128 * (number + 1);
+            let number = number as usize;
+            assert_eq!(read(&range(end), number).unwrap(), camera(&set).unwrap());
+            assert!(read(&range(end - 1), number).is_err());
+        }
     }
 
     #[test]

@@ -10,6 +10,9 @@ pub(crate) mod buffer;
 pub(crate) mod camera;
 pub(crate) mod draw;
 pub(crate) mod dynamic_state;
+pub(crate) mod gaussian_harmonics;
+pub(crate) mod gaussian_set;
+pub(crate) mod gaussian_state;
 pub(crate) mod query;
 pub(crate) mod render_pass;
 mod render_scope;
@@ -27,11 +30,24 @@ use crate::pipeline::dynamic_state::DynamicState;
 use crate::query_pool::QueryPool;
 use crate::sync::Event;
 use ash::vk;
-use simdevice::Packet;
 use simdevice::packet::BufferRange;
 use simdevice::state::gaussian::Camera;
 use simdevice::state::{Rect, Viewport};
+use simdevice::{Format, Packet};
 use std::sync::Arc;
+
+/// A bound buffer of spherical harmonics.
+#[derive(Clone, Debug)]
+pub(crate) struct HarmonicsBuffer {
+    /// The bytes that may be read.
+    pub(crate) range: BufferRange,
+    /// The format of a coefficient.
+    pub(crate) format: Format,
+    /// Bytes from a Gaussian to the next.
+    pub(crate) stride: u32,
+    /// Bytes from a coefficient to the next.
+    pub(crate) coefficient_stride: u64,
+}
 
 /// A recorded command.
 #[derive(Clone, Debug)]
@@ -70,8 +86,14 @@ pub(crate) enum Command {
     },
     /// Any other `vkCmdSet...` of fixed-function state.
     SetDynamicState(DynamicState),
-    /// `vkCmdSetGaussianCameraGAURAST`.
-    SetCamera(Box<Camera>),
+    /// `vkCmdSetGaussianCamerasGAURAST`.
+    SetCameras(Box<[Camera]>),
+    /// `vkCmdBindGaussianSphericalHarmonicsGAURAST`.
+    BindHarmonics(Box<HarmonicsBuffer>),
+    /// `vkCmdBeginGaussianSetGAURAST`.
+    BeginGaussianSet,
+    /// `vkCmdEndGaussianSetGAURAST`.
+    EndGaussianSet,
     /// `vkCmdDraw` and `vkCmdDrawIndexed`.
     Draw(DrawParameters),
     /// `vkCmdDrawIndirect`, `vkCmdDrawIndexedIndirect` and their forms with a count: the draws are read when they

@@ -129,6 +129,7 @@ unsafe fn attachment(
 #[doc(alias = "vkCmdNextSubpass")]
 #[doc(alias = "vkCmdNextSubpass2")]
 pub(crate) fn cmd_next_subpass(recorder: &mut Recorder) -> Result<(), Error> {
+    recorder.require_no_gaussian_set()?;
     match recorder.pass.take() {
         Some(RenderScope::RenderPass {
             instance, subpass, ..
@@ -165,6 +166,7 @@ fn enter_subpass(
 #[doc(alias = "vkCmdEndRenderPass")]
 #[doc(alias = "vkCmdEndRenderPass2")]
 pub(crate) fn cmd_end_render_pass(recorder: &mut Recorder) -> Result<(), Error> {
+    recorder.require_no_gaussian_set()?;
     match recorder.pass.take() {
         Some(RenderScope::RenderPass { .. }) => {
             recorder.packet(Packet::EndRendering);
@@ -189,6 +191,7 @@ fn begin_rendering(recorder: &mut Recorder, packet: Packet) -> Result<(), Error>
 
 #[doc(alias = "vkCmdEndRendering")]
 pub(crate) fn cmd_end_rendering(recorder: &mut Recorder) -> Result<(), Error> {
+    recorder.require_no_gaussian_set()?;
     match recorder.pass.take() {
         Some(RenderScope::Dynamic { .. }) => {
             recorder.packet(Packet::EndRendering);

@@ -307,7 +307,19 @@ static ROWS: &[Command] = rows! {
         vkGetPhysicalDeviceToolPropertiesEXT: vk::PFN_vkGetPhysicalDeviceToolProperties = vkGetPhysicalDeviceToolProperties;
     }
     Device, DeviceExtension(&[c"VK_GAURAST_gaussian_primitive_topology"]) => {
-        vkCmdSetGaussianCameraGAURAST: gaurast::vk::PFN_vkCmdSetGaussianCameraGAURAST = vkCmdSetGaussianCameraGAURAST;
+        vkCmdSetGaussianCamerasGAURAST: gaurast::vk::PFN_vkCmdSetGaussianCamerasGAURAST = vkCmdSetGaussianCamerasGAURAST;
+        vkCmdBeginGaussianSetGAURAST: gaurast::vk::PFN_vkCmdBeginGaussianSetGAURAST = vkCmdBeginGaussianSetGAURAST;
+        vkCmdEndGaussianSetGAURAST: gaurast::vk::PFN_vkCmdEndGaussianSetGAURAST = vkCmdEndGaussianSetGAURAST;
+        vkCmdBindGaussianSphericalHarmonicsGAURAST: gaurast::vk::PFN_vkCmdBindGaussianSphericalHarmonicsGAURAST = vkCmdBindGaussianSphericalHarmonicsGAURAST;
+        vkCmdSetGaussianOrderGAURAST: gaurast::vk::PFN_vkCmdSetGaussianOrderGAURAST = vkCmdSetGaussianOrderGAURAST;
+        vkCmdSetGaussianAntialiasingGAURAST: gaurast::vk::PFN_vkCmdSetGaussianAntialiasingGAURAST = vkCmdSetGaussianAntialiasingGAURAST;
+        vkCmdSetGaussianLowPassVarianceGAURAST: gaurast::vk::PFN_vkCmdSetGaussianLowPassVarianceGAURAST = vkCmdSetGaussianLowPassVarianceGAURAST;
+        vkCmdSetGaussianAlphaFloorGAURAST: gaurast::vk::PFN_vkCmdSetGaussianAlphaFloorGAURAST = vkCmdSetGaussianAlphaFloorGAURAST;
+        vkCmdSetGaussianAlphaCeilingGAURAST: gaurast::vk::PFN_vkCmdSetGaussianAlphaCeilingGAURAST = vkCmdSetGaussianAlphaCeilingGAURAST;
+        vkCmdSetGaussianTransmittanceFloorGAURAST: gaurast::vk::PFN_vkCmdSetGaussianTransmittanceFloorGAURAST = vkCmdSetGaussianTransmittanceFloorGAURAST;
+        vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST: gaurast::vk::PFN_vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST = vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST;
+        vkCmdSetGaussianExponentialErrorGAURAST: gaurast::vk::PFN_vkCmdSetGaussianExponentialErrorGAURAST = vkCmdSetGaussianExponentialErrorGAURAST;
+        vkCmdSetGaussianContributionBudgetGAURAST: gaurast::vk::PFN_vkCmdSetGaussianContributionBudgetGAURAST = vkCmdSetGaussianContributionBudgetGAURAST;
     }
     Device, DeviceExtension(&[c"VK_KHR_bind_memory2"]) => {
         vkBindBufferMemory2KHR: vk::PFN_vkBindBufferMemory2 = vkBindBufferMemory2;
@@ -4477,25 +4489,275 @@ unsafe extern "system" fn vkCmdSetLogicOpEXT(command_buffer: vk::CommandBuffer, 
     })
 }
 
-unsafe extern "system" fn vkCmdSetGaussianCameraGAURAST(
+unsafe extern "system" fn vkCmdSetGaussianCamerasGAURAST(
     command_buffer: vk::CommandBuffer,
-    p_camera: *const gaurast::vk::GaussianCameraGAURAST<'_>,
+    camera_count: u32,
+    p_cameras: *const gaurast::vk::GaussianCameraGAURAST<'_>,
 ) {
-    guard(command_buffer, "vkCmdSetGaussianCameraGAURAST", || {
+    guard(command_buffer, "vkCmdSetGaussianCamerasGAURAST", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
             record(
                 command_buffer,
-                "vkCmdSetGaussianCameraGAURAST",
+                "vkCmdSetGaussianCamerasGAURAST",
                 |recorder| {
-                    crate::command::camera::cmd_set_gaussian_camera(
+                    crate::command::camera::cmd_set_gaussian_cameras(
                         recorder,
-                        valid::input(p_camera)?,
+                        valid::slice(p_cameras, camera_count)?,
                     )
                 },
             )
         }
     })
+}
+
+unsafe extern "system" fn vkCmdBeginGaussianSetGAURAST(command_buffer: vk::CommandBuffer) {
+    guard(command_buffer, "vkCmdBeginGaussianSetGAURAST", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::command::gaussian_set::cmd_begin_gaussian_set(handle::get(command_buffer)?)
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdEndGaussianSetGAURAST(command_buffer: vk::CommandBuffer) {
+    guard(command_buffer, "vkCmdEndGaussianSetGAURAST", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdEndGaussianSetGAURAST", |recorder| {
+                crate::command::gaussian_set::cmd_end_gaussian_set(recorder)
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdBindGaussianSphericalHarmonicsGAURAST(
+    command_buffer: vk::CommandBuffer,
+    p_buffer: *const gaurast::vk::GaussianSphericalHarmonicsBufferGAURAST<'_>,
+) {
+    guard(
+        command_buffer,
+        "vkCmdBindGaussianSphericalHarmonicsGAURAST",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                crate::command::gaussian_harmonics::cmd_bind_gaussian_spherical_harmonics(
+                    handle::get(command_buffer)?,
+                    valid::input(p_buffer)?,
+                )
+            }
+        },
+    )
+}
+
+unsafe extern "system" fn vkCmdSetGaussianOrderGAURAST(
+    command_buffer: vk::CommandBuffer,
+    order: gaurast::vk::GaussianOrderGAURAST,
+) {
+    guard(command_buffer, "vkCmdSetGaussianOrderGAURAST", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdSetGaussianOrderGAURAST", |recorder| {
+                crate::command::gaussian_state::cmd_set_gaussian_order(recorder, order)
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetGaussianAntialiasingGAURAST(
+    command_buffer: vk::CommandBuffer,
+    antialiasing: gaurast::vk::GaussianAntialiasingGAURAST,
+) {
+    guard(
+        command_buffer,
+        "vkCmdSetGaussianAntialiasingGAURAST",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                record(
+                    command_buffer,
+                    "vkCmdSetGaussianAntialiasingGAURAST",
+                    |recorder| {
+                        crate::command::gaussian_state::cmd_set_gaussian_antialiasing(
+                            recorder,
+                            antialiasing,
+                        )
+                    },
+                )
+            }
+        },
+    )
+}
+
+unsafe extern "system" fn vkCmdSetGaussianLowPassVarianceGAURAST(
+    command_buffer: vk::CommandBuffer,
+    low_pass_variance: f32,
+) {
+    guard(
+        command_buffer,
+        "vkCmdSetGaussianLowPassVarianceGAURAST",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                record(
+                    command_buffer,
+                    "vkCmdSetGaussianLowPassVarianceGAURAST",
+                    |recorder| {
+                        crate::command::gaussian_state::cmd_set_gaussian_low_pass_variance(
+                            recorder,
+                            low_pass_variance,
+                        )
+                    },
+                )
+            }
+        },
+    )
+}
+
+unsafe extern "system" fn vkCmdSetGaussianAlphaFloorGAURAST(
+    command_buffer: vk::CommandBuffer,
+    alpha_floor: f32,
+) {
+    guard(command_buffer, "vkCmdSetGaussianAlphaFloorGAURAST", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(
+                command_buffer,
+                "vkCmdSetGaussianAlphaFloorGAURAST",
+                |recorder| {
+                    crate::command::gaussian_state::cmd_set_gaussian_alpha_floor(
+                        recorder,
+                        alpha_floor,
+                    )
+                },
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetGaussianAlphaCeilingGAURAST(
+    command_buffer: vk::CommandBuffer,
+    alpha_ceiling: f32,
+) {
+    guard(
+        command_buffer,
+        "vkCmdSetGaussianAlphaCeilingGAURAST",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                record(
+                    command_buffer,
+                    "vkCmdSetGaussianAlphaCeilingGAURAST",
+                    |recorder| {
+                        crate::command::gaussian_state::cmd_set_gaussian_alpha_ceiling(
+                            recorder,
+                            alpha_ceiling,
+                        )
+                    },
+                )
+            }
+        },
+    )
+}
+
+unsafe extern "system" fn vkCmdSetGaussianTransmittanceFloorGAURAST(
+    command_buffer: vk::CommandBuffer,
+    transmittance_floor: f32,
+) {
+    guard(
+        command_buffer,
+        "vkCmdSetGaussianTransmittanceFloorGAURAST",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                record(
+                    command_buffer,
+                    "vkCmdSetGaussianTransmittanceFloorGAURAST",
+                    |recorder| {
+                        crate::command::gaussian_state::cmd_set_gaussian_transmittance_floor(
+                            recorder,
+                            transmittance_floor,
+                        )
+                    },
+                )
+            }
+        },
+    )
+}
+
+unsafe extern "system" fn vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST(
+    command_buffer: vk::CommandBuffer,
+    spherical_harmonics_degree: u32,
+) {
+    guard(
+        command_buffer,
+        "vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                record(
+                    command_buffer,
+                    "vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST",
+                    |recorder| {
+                        crate::command::gaussian_state::cmd_set_gaussian_spherical_harmonics_degree(
+                            recorder,
+                            spherical_harmonics_degree,
+                        )
+                    },
+                )
+            }
+        },
+    )
+}
+
+unsafe extern "system" fn vkCmdSetGaussianExponentialErrorGAURAST(
+    command_buffer: vk::CommandBuffer,
+    exponential_error: f32,
+) {
+    guard(
+        command_buffer,
+        "vkCmdSetGaussianExponentialErrorGAURAST",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                record(
+                    command_buffer,
+                    "vkCmdSetGaussianExponentialErrorGAURAST",
+                    |recorder| {
+                        crate::command::gaussian_state::cmd_set_gaussian_exponential_error(
+                            recorder,
+                            exponential_error,
+                        )
+                    },
+                )
+            }
+        },
+    )
+}
+
+unsafe extern "system" fn vkCmdSetGaussianContributionBudgetGAURAST(
+    command_buffer: vk::CommandBuffer,
+    contribution_budget: f32,
+) {
+    guard(
+        command_buffer,
+        "vkCmdSetGaussianContributionBudgetGAURAST",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                record(
+                    command_buffer,
+                    "vkCmdSetGaussianContributionBudgetGAURAST",
+                    |recorder| {
+                        crate::command::gaussian_state::cmd_set_gaussian_contribution_budget(
+                            recorder,
+                            contribution_budget,
+                        )
+                    },
+                )
+            }
+        },
+    )
 }
 
 unsafe extern "system" fn vkCmdPushDescriptorSetWithTemplateKHR(

@@ -34,10 +34,6 @@ const MAX_GAUSSIANS: u64 = u32::MAX as u64;
 /// The greatest degree of spherical harmonics that a pipeline may ask for.
 pub(crate) const MAX_SPHERICAL_HARMONICS_DEGREE: u32 = 4;
 
-/// The paper's scaled design: 15 rasterizer modules of 16 processing elements.
-const RASTERIZER_MODULES: u32 = 15;
-const PROCESSING_ELEMENTS: u32 = 16;
-
 /// The greatest extent of an image in two dimensions, and of framebuffers and viewports.
 pub(crate) const MAX_IMAGE_DIMENSION: u32 = 16384;
 
@@ -413,8 +409,6 @@ fn find_properties() -> Properties {
             width: 16,
             height: 16,
         },
-        rasterizer_module_count: RASTERIZER_MODULES,
-        processing_element_count: PROCESSING_ELEMENTS,
         max_spherical_harmonics_degree: MAX_SPHERICAL_HARMONICS_DEGREE,
         gaussian_sample_counts: SAMPLE_COUNTS,
         max_gaussians_per_draw: MAX_GAUSSIANS,

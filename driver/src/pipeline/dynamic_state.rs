@@ -3,10 +3,58 @@
 use super::state::FixedFunctionState as Fixed;
 use crate::convert::StencilOps;
 use ash::vk;
+use simdevice::state::gaussian::GaussianOrder;
 use simdevice::state::{CompareOp, DepthBias, Topology};
 
 /// The face that a stencil state is for: 0 is the front, 1 the back.
 pub(crate) type Face = usize;
+
+/// The extension's dynamic states, beside Vulkan's.
+pub(super) trait GaussianStates {
+    const GAUSSIAN_ORDER: Self;
+    const GAUSSIAN_ANTIALIASING: Self;
+    const GAUSSIAN_LOW_PASS_VARIANCE: Self;
+    const GAUSSIAN_ALPHA_FLOOR: Self;
+    const GAUSSIAN_ALPHA_CEILING: Self;
+    const GAUSSIAN_TRANSMITTANCE_FLOOR: Self;
+    const GAUSSIAN_SPHERICAL_HARMONICS_DEGREE: Self;
+    const GAUSSIAN_EXPONENTIAL_ERROR: Self;
+    const GAUSSIAN_CONTRIBUTION_BUDGET: Self;
+}
+
+impl GaussianStates for vk::DynamicState {
+    const GAUSSIAN_ORDER: Self = gaurast::vk::DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST;
+    const GAUSSIAN_ANTIALIASING: Self = gaurast::vk::DYNAMIC_STATE_GAUSSIAN_ANTIALIASING_GAURAST;
+    const GAUSSIAN_LOW_PASS_VARIANCE: Self =
+        gaurast::vk::DYNAMIC_STATE_GAUSSIAN_LOW_PASS_VARIANCE_GAURAST;
+    const GAUSSIAN_ALPHA_FLOOR: Self = gaurast::vk::DYNAMIC_STATE_GAUSSIAN_ALPHA_FLOOR_GAURAST;
+    const GAUSSIAN_ALPHA_CEILING: Self = gaurast::vk::DYNAMIC_STATE_GAUSSIAN_ALPHA_CEILING_GAURAST;
+    const GAUSSIAN_TRANSMITTANCE_FLOOR: Self =
+        gaurast::vk::DYNAMIC_STATE_GAUSSIAN_TRANSMITTANCE_FLOOR_GAURAST;
+    const GAUSSIAN_SPHERICAL_HARMONICS_DEGREE: Self =
+        gaurast::vk::DYNAMIC_STATE_GAUSSIAN_SPHERICAL_HARMONICS_DEGREE_GAURAST;
+    const GAUSSIAN_EXPONENTIAL_ERROR: Self =
+        gaurast::vk::DYNAMIC_STATE_GAUSSIAN_EXPONENTIAL_ERROR_GAURAST;
+    const GAUSSIAN_CONTRIBUTION_BUDGET: Self =
+        gaurast::vk::DYNAMIC_STATE_GAUSSIAN_CONTRIBUTION_BUDGET_GAURAST;
+}
+
+/// Tells if a state is one of the extension's.
+pub(super) fn is_of_gaussians(state: vk::DynamicState) -> bool {
+    use vk::DynamicState as S;
+    [
+        S::GAUSSIAN_ORDER,
+        S::GAUSSIAN_ANTIALIASING,
+        S::GAUSSIAN_LOW_PASS_VARIANCE,
+        S::GAUSSIAN_ALPHA_FLOOR,
+        S::GAUSSIAN_ALPHA_CEILING,
+        S::GAUSSIAN_TRANSMITTANCE_FLOOR,
+        S::GAUSSIAN_SPHERICAL_HARMONICS_DEGREE,
+        S::GAUSSIAN_EXPONENTIAL_ERROR,
+        S::GAUSSIAN_CONTRIBUTION_BUDGET,
+    ]
+    .contains(&state)
+}
 
 /// The use that Gaussians make of a dynamic state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -110,6 +158,29 @@ dynamic_states! {
         set |state| state.draw.primitive_restart = enable, needed |_| true, gaussians Refused;
     RASTERIZER_DISCARD_ENABLE => RasterizerDiscardEnable(enable: bool),
         set |state| state.draw.rasterizer_discard = enable, needed |_| true, gaussians Refused;
+    GAUSSIAN_ORDER => GaussianOrder(order: GaussianOrder),
+        set |state| state.set_gaussian(|own| own.order = order), needed Fixed::draws_gaussians, gaussians Taken;
+    GAUSSIAN_ANTIALIASING => GaussianAntialiasing(compensated: bool),
+        set |state| state.set_gaussian(|own| own.opacity_compensated = compensated),
+        needed Fixed::draws_gaussians, gaussians Taken;
+    GAUSSIAN_LOW_PASS_VARIANCE => GaussianLowPassVariance(variance: f32),
+        set |state| state.set_gaussian(|own| own.low_pass_variance = variance),
+        needed Fixed::draws_gaussians, gaussians Taken;
+    GAUSSIAN_ALPHA_FLOOR => GaussianAlphaFloor(floor: f32),
+        set |state| state.set_gaussian(|own| own.alpha_floor = floor), needed Fixed::draws_gaussians, gaussians Taken;
+    GAUSSIAN_ALPHA_CEILING => GaussianAlphaCeiling(ceiling: f32),
+        set |state| state.set_gaussian(|own| own.alpha_ceiling = ceiling), needed Fixed::draws_gaussians, gaussians Taken;
+    GAUSSIAN_TRANSMITTANCE_FLOOR => GaussianTransmittanceFloor(floor: f32),
+        set |state| state.set_gaussian(|own| own.transmittance_floor = floor),
+        needed Fixed::draws_gaussians, gaussians Taken;
+    GAUSSIAN_SPHERICAL_HARMONICS_DEGREE => GaussianSphericalHarmonicsDegree(degree: u32),
+        set |state| state.set_gaussian(|own| own.sh_degree = degree), needed Fixed::draws_gaussians, gaussians Taken;
+    GAUSSIAN_EXPONENTIAL_ERROR => GaussianExponentialError(error: f32),
+        set |state| state.set_gaussian(|own| own.approximation.exponential_error = error),
+        needed Fixed::draws_gaussians, gaussians Taken;
+    GAUSSIAN_CONTRIBUTION_BUDGET => GaussianContributionBudget(budget: f32),
+        set |state| state.set_gaussian(|own| own.approximation.contribution_budget = budget),
+        needed Fixed::draws_gaussians, gaussians Taken;
 }
 
 /// The dynamic states that are looked up for each draw, and that no row has a value of: viewports, scissors and strides.
@@ -228,7 +299,7 @@ mod tests {
         assert!(all().all(is_supported));
         assert!(!is_supported(S::LINE_STIPPLE_KHR));
         let taken = all().filter(|&state| is_taken_by_gaussians(state));
-        assert_eq!(taken.count(), 11);
+        assert_eq!(taken.count(), 20);
         let refused = all().filter(|&state| !may_gaussians_have(state));
         let expected = [S::PRIMITIVE_RESTART_ENABLE, S::RASTERIZER_DISCARD_ENABLE];
         assert_eq!(refused.collect::<Vec<_>>(), expected);

@@ -14,6 +14,7 @@ use gaurast::vk::{
     PipelineGaussianApproximationStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 use simdevice::Format;
+use simdevice::state::gaussian::GaussianState;
 use simdevice::state::{
     BlendFactor, BlendState, CompareOp, DepthBias, DepthStencil, DepthTest, DrawState, PolygonMode,
     StencilFace, StencilOp, Topology,
@@ -505,6 +506,8 @@ pub(crate) struct FixedFunctionState {
     pub(super) depth_bounds: (f32, f32),
     pub(super) stencil_test: bool,
     pub(super) stencil: [StencilFace; 2],
+    /// What Gaussians are drawn by, if the pipeline draws Gaussians.
+    pub(super) gaussian: Option<Box<GaussianState>>,
 }
 
 /// The ids of the rules on the operations of `VkStencilOpState`.
@@ -646,6 +649,7 @@ impl FixedFunctionState {
             depth_bounds: (0.0, 1.0),
             stencil_test: false,
             stencil: [KEEP; 2],
+            gaussian: None,
         };
         state.set_cull_mode(raster.cull_mode);
         state.set_front_face(raster.front_face);
@@ -852,6 +856,28 @@ impl FixedFunctionState {
     /// Tells if an attachment is blended by the constants.
     pub(super) fn blends_by_constants(&self) -> bool {
         self.rasterizes() && self.draw.logic_op.is_none() && blends_by_constants(&self.draw)
+    }
+
+    /// Tells if Gaussians are drawn.
+    pub(super) fn draws_gaussians(&self) -> bool {
+        self.gaussian.is_some()
+    }
+
+    /// Changes what Gaussians are drawn by, if any are.
+    pub(super) fn set_gaussian(&mut self, set: impl FnOnce(&mut GaussianState)) {
+        if let Some(state) = &mut self.gaussian {
+            set(state);
+        }
+    }
+
+    /// What Gaussians are drawn by, with the rest of the state that they take.
+    pub(crate) fn gaussian_state(&self) -> GaussianState {
+        let converted = self.draw_state();
+        GaussianState {
+            depth_stencil: converted.depth_stencil,
+            blend_constants: converted.blend_constants,
+            ..self.gaussian.as_deref().cloned().unwrap_or_default()
+        }
     }
 
     /// The state for the device.

@@ -19,7 +19,7 @@ pub(crate) const INSTANCE: &[Extension] = &[
 
 /// The device extensions.
 pub(crate) const DEVICE: &[Extension] = &[
-    (c"VK_GAURAST_gaussian_primitive_topology", 1),
+    (c"VK_GAURAST_gaussian_primitive_topology", 2),
     (c"VK_EXT_4444_formats", 1),
     (c"VK_EXT_border_color_swizzle", 1),
     (c"VK_EXT_custom_border_color", 12),

@@ -346,6 +346,14 @@ pub(crate) struct Features {
     pub(crate) gaussian_multisample: bool,
     /// `gaussianApproximation`.
     pub(crate) gaussian_approximation: bool,
+    /// `gaussianMultiview`.
+    pub(crate) gaussian_multiview: bool,
+    /// `attributeActivation`.
+    pub(crate) attribute_activation: bool,
+    /// `sphericalHarmonicsBuffer`.
+    pub(crate) spherical_harmonics_buffer: bool,
+    /// `gaussianDynamicState`.
+    pub(crate) gaussian_dynamic_state: bool,
     /// `performanceCounterQueryPools`.
     pub(crate) performance_counter_query_pools: bool,
     /// `performanceCounterMultipleQueryPools`.
@@ -500,6 +508,10 @@ pub(crate) const SUPPORTED: Features = Features {
     gaussian_depth_stencil: true,
     gaussian_multisample: true,
     gaussian_approximation: true,
+    gaussian_multiview: true,
+    attribute_activation: true,
+    spherical_harmonics_buffer: true,
+    gaussian_dynamic_state: true,
     performance_counter_query_pools: true,
     workgroup_memory_explicit_layout: true,
     workgroup_memory_explicit_layout_scalar_block_layout: true,
@@ -679,6 +691,10 @@ impl Features {
         gaussian_depth_stencil: false,
         gaussian_multisample: false,
         gaussian_approximation: false,
+        gaussian_multiview: false,
+        attribute_activation: false,
+        spherical_harmonics_buffer: false,
+        gaussian_dynamic_state: false,
         performance_counter_query_pools: false,
         performance_counter_multiple_query_pools: false,
         workgroup_memory_explicit_layout: false,
@@ -688,7 +704,7 @@ impl Features {
     };
 
     /// The features by their names in Rust.
-    pub(crate) fn list(&self) -> [(&'static str, bool); 174] {
+    pub(crate) fn list(&self) -> [(&'static str, bool); 178] {
         [
             ("robust_buffer_access", self.robust_buffer_access),
             ("full_draw_index_uint32", self.full_draw_index_uint32),
@@ -1059,6 +1075,13 @@ impl Features {
             ("gaussian_depth_stencil", self.gaussian_depth_stencil),
             ("gaussian_multisample", self.gaussian_multisample),
             ("gaussian_approximation", self.gaussian_approximation),
+            ("gaussian_multiview", self.gaussian_multiview),
+            ("attribute_activation", self.attribute_activation),
+            (
+                "spherical_harmonics_buffer",
+                self.spherical_harmonics_buffer,
+            ),
+            ("gaussian_dynamic_state", self.gaussian_dynamic_state),
             (
                 "performance_counter_query_pools",
                 self.performance_counter_query_pools,
@@ -1611,6 +1634,10 @@ impl Features {
             out.gaussian_depth_stencil = self.gaussian_depth_stencil.into();
             out.gaussian_multisample = self.gaussian_multisample.into();
             out.gaussian_approximation = self.gaussian_approximation.into();
+            out.gaussian_multiview = self.gaussian_multiview.into();
+            out.attribute_activation = self.attribute_activation.into();
+            out.spherical_harmonics_buffer = self.spherical_harmonics_buffer.into();
+            out.gaussian_dynamic_state = self.gaussian_dynamic_state.into();
         }
         if let Some(out) = structure.cast::<vk::PhysicalDevicePerformanceQueryFeaturesKHR<'_>>() {
             out.performance_counter_query_pools = self.performance_counter_query_pools.into();
@@ -2071,6 +2098,10 @@ impl Features {
             self.gaussian_depth_stencil |= requested.gaussian_depth_stencil != vk::FALSE;
             self.gaussian_multisample |= requested.gaussian_multisample != vk::FALSE;
             self.gaussian_approximation |= requested.gaussian_approximation != vk::FALSE;
+            self.gaussian_multiview |= requested.gaussian_multiview != vk::FALSE;
+            self.attribute_activation |= requested.attribute_activation != vk::FALSE;
+            self.spherical_harmonics_buffer |= requested.spherical_harmonics_buffer != vk::FALSE;
+            self.gaussian_dynamic_state |= requested.gaussian_dynamic_state != vk::FALSE;
         }
         if let Some(requested) =
             valid::cast::<vk::PhysicalDevicePerformanceQueryFeaturesKHR<'_>>(structure)

@@ -484,10 +484,6 @@ pub(crate) struct Properties {
     pub(crate) max_vertex_attrib_divisor: u32,
     /// `tileSize`.
     pub(crate) tile_size: vk::Extent2D,
-    /// `rasterizerModuleCount`.
-    pub(crate) rasterizer_module_count: u32,
-    /// `processingElementCount`.
-    pub(crate) processing_element_count: u32,
     /// `maxSphericalHarmonicsDegree`.
     pub(crate) max_spherical_harmonics_degree: u32,
     /// `gaussianSampleCounts`.
@@ -1136,8 +1132,6 @@ impl Properties {
             .cast::<gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_>>(
         ) {
             out.tile_size = self.tile_size;
-            out.rasterizer_module_count = self.rasterizer_module_count;
-            out.processing_element_count = self.processing_element_count;
             out.max_spherical_harmonics_degree = self.max_spherical_harmonics_degree;
             out.gaussian_sample_counts = self.gaussian_sample_counts;
             out.max_gaussians_per_draw = self.max_gaussians_per_draw;

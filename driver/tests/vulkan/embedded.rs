@@ -208,7 +208,7 @@ fn device_commands_appear_with_their_extension() {
         }
         .is_some()
     };
-    let set_camera = c"vkCmdSetGaussianCameraGAURAST";
+    let set_camera = c"vkCmdSetGaussianCamerasGAURAST";
     let bare = context.device(&[], &mut Default::default()).unwrap();
     assert!(!found(&bare, set_camera));
     assert!(!found(&bare, c"vkCreateDevice"));

@@ -287,7 +287,7 @@ fn a_draw_without_a_camera_draws_nothing_and_says_so() {
     assert!(scene.pixels().iter().all(|pixel| *pixel == [0.25; 4]));
     let messages = scene.gpu.take_messages().concat();
     assert!(
-        messages.contains("vkCmdSetGaussianCameraGAURAST"),
+        messages.contains("vkCmdSetGaussianCamerasGAURAST"),
         "{messages}"
     );
 }
@@ -300,7 +300,7 @@ fn a_camera_that_is_none_fails_the_recording() {
         // SAFETY: see the crate.
         unsafe {
             let gaussian = &scene.gpu.gaussian;
-            gaussian.cmd_set_gaussian_camera(commands, &camera);
+            gaussian.cmd_set_gaussian_cameras(commands, &[camera]);
         }
     });
     assert_eq!(

@@ -2,9 +2,7 @@
 
 use crate::scene::{PipelineRequest, Scene, Splat, camera, over, pass, splat};
 use ash::vk;
-use gaurast::vk::{
-    GaussianCameraDataGAURAST, GaussianCameraSourceGAURAST, PipelineGaussianStateCreateFlagsGAURAST,
-};
+use gaurast::vk::{GaussianCameraDataGAURAST, GaussianCameraSourceGAURAST};
 
 /// Overlapping Gaussians whose depths alternate between the first and the second half.
 fn interleaved() -> Vec<Splat> {
@@ -22,15 +20,10 @@ fn interleaved() -> Vec<Splat> {
     (0..16).map(one).collect()
 }
 
-fn merging() -> PipelineRequest<'static> {
-    let request = PipelineRequest {
+fn blended() -> PipelineRequest<'static> {
+    PipelineRequest {
         blend: vec![over()],
         ..PipelineRequest::default()
-    };
-    let merge = PipelineGaussianStateCreateFlagsGAURAST::MERGE_DRAWS;
-    PipelineRequest {
-        gaussian: request.gaussian.map(|state| state.flags(merge)),
-        ..request
     }
 }
 
@@ -45,75 +38,114 @@ fn halves(scene: &Scene, between: impl FnOnce(&ash::Device, vk::CommandBuffer)) 
     })
 }
 
+/// As [`halves`], as one set.
+fn merged(scene: &Scene, between: impl FnOnce(&ash::Device, vk::CommandBuffer)) -> Vec<[f32; 4]> {
+    let gaussian = &scene.gpu.gaussian;
+    scene.draw([0.0; 4], |device, commands| {
+        // SAFETY: see the crate.
+        unsafe {
+            gaussian.cmd_begin_gaussian_set(commands);
+            device.cmd_draw(commands, 8, 1, 0, 0);
+        }
+        between(device, commands);
+        // SAFETY: see the crate.
+        unsafe {
+            device.cmd_draw(commands, 8, 1, 8, 0);
+            gaussian.cmd_end_gaussian_set(commands);
+        }
+    })
+}
+
 #[gaurast_runner::test]
-fn merged_draws_are_one_sorted_set() {
-    let scene = Scene::new(&interleaved(), &merging());
+fn draws_between_begin_and_end_are_one_sorted_set() {
+    let scene = Scene::new(&interleaved(), &blended());
     let whole = scene.draw([0.0; 4], |device, commands| {
         // SAFETY: see the crate.
         unsafe { device.cmd_draw(commands, 16, 1, 0, 0) };
     });
-    assert!(halves(&scene, |_, _| {}) == whole);
+    assert!(merged(&scene, |_, _| {}) == whole);
+    assert!(halves(&scene, |_, _| {}) != whole, "without, each is a set");
     // Buffers may be bound meanwhile.
-    let bound = halves(&scene, |device, commands| {
+    let bound = merged(&scene, |device, commands| {
         // SAFETY: see the crate.
         unsafe { device.cmd_bind_vertex_buffers(commands, 0, &[scene.splats.buffer], &[0]) };
     });
     assert!(bound == whole);
     // Indirect draws are draws like others.
     let numbers = scene.gpu.buffer_of(&[8u32, 1, 8, 0, 8, 1, 0, 0]);
+    let gaussian = &scene.gpu.gaussian;
     let indirect = scene.draw([0.0; 4], |device, commands| {
         // SAFETY: see the crate.
-        unsafe { device.cmd_draw_indirect(commands, numbers.buffer, 0, 2, 16) };
+        unsafe {
+            gaussian.cmd_begin_gaussian_set(commands);
+            device.cmd_draw_indirect(commands, numbers.buffer, 0, 2, 16);
+            gaussian.cmd_end_gaussian_set(commands);
+        }
     });
     assert!(indirect == whole);
     scene.gpu.free_buffer(numbers);
     assert_eq!(scene.gpu.take_messages(), Vec::<String>::new());
 }
 
+/// No command but the end ends a set.
 #[gaurast_runner::test]
-fn anything_else_between_draws_ends_the_set() {
-    let scene = Scene::new(&interleaved(), &merging());
-    let apart = Scene::new(
-        &interleaved(),
-        &PipelineRequest {
-            blend: vec![over()],
-            ..PipelineRequest::default()
-        },
-    );
-    let two_sets = halves(&apart, |_, _| {});
-    assert!(two_sets != halves(&scene, |_, _| {}));
-    let bind = halves(&scene, |device, commands| {
+fn innocent_commands_do_not_end_a_set() {
+    let scene = Scene::new(&interleaved(), &blended());
+    let whole = merged(&scene, |_, _| {});
+    let info = vk::QueryPoolCreateInfo::default()
+        .query_type(vk::QueryType::TIMESTAMP)
+        .query_count(1);
+    // SAFETY: see the crate.
+    let pool = unsafe { scene.gpu.device.create_query_pool(&info, None) }.unwrap();
+    // SAFETY: see the crate.
+    unsafe { scene.gpu.device.reset_query_pool(pool, 0, 1) };
+    let meanwhile = merged(&scene, |device, commands| {
         let point = vk::PipelineBindPoint::GRAPHICS;
-        // SAFETY: see the crate.
-        unsafe { device.cmd_bind_pipeline(commands, point, scene.pipeline) };
-    });
-    assert!(bind == two_sets);
-    let look = halves(&scene, |_, commands| {
+        let all = vk::PipelineStageFlags::ALL_COMMANDS;
         let gaussian = &scene.gpu.gaussian;
         // SAFETY: see the crate.
-        unsafe { gaussian.cmd_set_gaussian_camera(commands, &camera()) };
-    });
-    assert!(look == two_sets);
-    // The end of a pass, and of the commands, ends it too.
-    scene.gpu.run(|device, commands| {
-        for first in [0, 8] {
-            pass(device, commands, scene.image, [0.0; 4], || {
-                scene.bind(device, commands);
-                // SAFETY: see the crate.
-                unsafe { device.cmd_draw(commands, 8, 1, first, 0) };
-            });
+        unsafe {
+            device.cmd_write_timestamp(commands, all, pool, 0);
+            device.cmd_bind_pipeline(commands, point, scene.pipeline);
+            gaussian.cmd_set_gaussian_cameras(commands, &[camera()]);
+            device.cmd_set_line_width(commands, 1.0);
+            device.cmd_set_blend_constants(commands, &[0.5; 4]);
         }
     });
-    let second = apart.draw([0.0; 4], |device, commands| {
+    assert!(meanwhile == whole);
+    assert_eq!(scene.gpu.take_messages(), Vec::<String>::new());
+    // SAFETY: see the crate.
+    unsafe { scene.gpu.device.destroy_query_pool(pool, None) };
+}
+
+/// A set is drawn where it ends: what else is drawn within it lies behind it.
+#[gaurast_runner::test]
+fn a_set_is_drawn_where_it_ends() {
+    let scene = Scene::new(&interleaved(), &blended());
+    let clear = |device: &ash::Device, commands| {
+        let value = vk::ClearValue {
+            color: vk::ClearColorValue { float32: [0.5; 4] },
+        };
+        let attachment = vk::ClearAttachment::default()
+            .aspect_mask(vk::ImageAspectFlags::COLOR)
+            .clear_value(value);
+        let rect = vk::ClearRect::default()
+            .rect(crate::scene::area(scene.image))
+            .layer_count(1);
         // SAFETY: see the crate.
-        unsafe { device.cmd_draw(commands, 8, 1, 8, 0) };
+        unsafe { device.cmd_clear_attachments(commands, &[attachment], &[rect]) };
+    };
+    let before = scene.draw([0.0; 4], |device, commands| {
+        clear(device, commands);
+        // SAFETY: see the crate.
+        unsafe { device.cmd_draw(commands, 16, 1, 0, 0) };
     });
-    assert!(scene.pixels() == second);
+    assert!(merged(&scene, clear) == before);
 }
 
 /// The bytes of a camera as a uniform buffer holds it.
 fn camera_bytes(data: &GaussianCameraDataGAURAST) -> Vec<u8> {
-    // SAFETY: the structure has no padding: 3 x 8, 2 x 4, 12 x 4 and 8 x 4 bytes.
+    // SAFETY: the structure has no padding: 3 x 8, 2 x 4, 12 x 4, 8 x 4 and 4 x 4 bytes.
     let bytes = unsafe {
         std::slice::from_raw_parts(std::ptr::from_ref(data).cast::<u8>(), size_of_val(data))
     };
@@ -200,7 +232,7 @@ fn the_camera_may_come_from_a_uniform_buffer() {
     let buffer = scene.gpu.buffer_of(&bytes);
     let infos = [vk::DescriptorBufferInfo::default()
         .buffer(buffer.buffer)
-        .range(112)];
+        .range(128)];
     let write = vk::WriteDescriptorSet::default()
         .dst_set(camera_set.set)
         .dst_binding(3)
@@ -233,7 +265,7 @@ fn the_camera_may_come_from_a_uniform_buffer() {
         let expected = by_command.draw([0.0; 4], |device, commands| {
             // SAFETY: see the crate.
             unsafe {
-                (by_command.gpu.gaussian).cmd_set_gaussian_camera(commands, &camera);
+                (by_command.gpu.gaussian).cmd_set_gaussian_cameras(commands, &[camera]);
                 device.cmd_draw(commands, 16, 1, 0, 0);
             }
         });

@@ -9,8 +9,7 @@ use ash::vk;
 use gaurast::vk::{
     GaussianAntialiasingGAURAST, GaussianCameraGAURAST, GaussianOrderGAURAST,
     GaussianPrecisionGAURAST, GaussianProjectionModeGAURAST, GaussianResolveInputLocationsGAURAST,
-    GaussianVertexOutputLocationsGAURAST, PipelineGaussianStateCreateFlagsGAURAST,
-    PipelineGaussianStateCreateInfoGAURAST,
+    GaussianVertexOutputLocationsGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 
 /// Gaussians of the scene.
@@ -230,7 +229,7 @@ impl Stage {
                 unsafe {
                     device.cmd_bind_pipeline(commands, point, pipeline);
                     device.cmd_bind_vertex_buffers(commands, 0, &buffers, &[0, 0]);
-                    gpu.gaussian.cmd_set_gaussian_camera(commands, &camera());
+                    gpu.gaussian.cmd_set_gaussian_cameras(commands, &[camera()]);
                 }
                 self.bind(device, commands);
                 record(device, commands);
@@ -359,29 +358,30 @@ fn vertices_are_named_as_for_other_shaders() {
 #[gaurast_runner::test]
 fn what_a_shader_is_bound_to_may_change_within_a_set() {
     let stage = Stage::new();
-    let merging = || {
-        let request = request(true);
-        let merge = PipelineGaussianStateCreateFlagsGAURAST::MERGE_DRAWS;
-        PipelineRequest {
-            gaussian: request.gaussian.map(|state| state.flags(merge)),
-            blend: vec![over()],
-            ..request
-        }
+    let blended = || PipelineRequest {
+        blend: vec![over()],
+        ..request(true)
     };
-    let whole = stage.draw(merging(), draw_all);
-    let in_two = stage.draw(merging(), |device, commands| {
+    let whole = stage.draw(blended(), draw_all);
+    let gaussian = &stage.canvas.gpu.gaussian;
+    let in_two = stage.draw(blended(), |device, commands| {
         // SAFETY: see the crate.
-        unsafe { device.cmd_draw(commands, 100, 1, 0, 0) };
+        unsafe {
+            gaussian.cmd_begin_gaussian_set(commands);
+            device.cmd_draw(commands, 100, 1, 0, 0);
+        }
         stage.bind(device, commands);
         // SAFETY: see the crate.
-        unsafe { device.cmd_draw(commands, COUNT - 100, 1, 100, 0) };
+        unsafe {
+            device.cmd_draw(commands, COUNT - 100, 1, 100, 0);
+            gaussian.cmd_end_gaussian_set(commands);
+        }
     });
     assert!(in_two == whole);
-    let apart = stage.draw(merging(), |device, commands| {
+    let apart = stage.draw(blended(), |device, commands| {
         // SAFETY: see the crate.
         unsafe {
             device.cmd_draw(commands, 100, 1, 0, 0);
-            device.cmd_set_blend_constants(commands, &[0.0; 4]);
             device.cmd_draw(commands, COUNT - 100, 1, 100, 0);
         }
     });

@@ -37,6 +37,7 @@ mod system_loader;
 mod transfers;
 mod valid_usage;
 mod validation;
+mod viewer_usage;
 mod watchdog;
 
 fn main() -> std::process::ExitCode {

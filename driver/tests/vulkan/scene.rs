@@ -60,6 +60,7 @@ pub struct PipelineRequest<'a> {
     pub dynamic: Vec<vk::DynamicState>,
     pub formats: Vec<vk::Format>,
     pub render_pass: vk::RenderPass,
+    pub view_mask: u32,
     /// Without sets or push constants if it is null.
     pub layout: vk::PipelineLayout,
     pub primitive_restart: bool,
@@ -106,6 +107,7 @@ impl Default for PipelineRequest<'_> {
             dynamic: vec![vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR],
             formats: vec![FORMAT],
             render_pass: vk::RenderPass::null(),
+            view_mask: 0,
             layout: vk::PipelineLayout::null(),
             primitive_restart: false,
             gaussian: Some(
@@ -147,6 +149,7 @@ impl PipelineRequest<'_> {
             vk::Format::UNDEFINED
         };
         let mut rendering = vk::PipelineRenderingCreateInfo::default()
+            .view_mask(self.view_mask)
             .color_attachment_formats(&self.formats)
             .depth_attachment_format(depth_format);
         let mut gaussian = self.gaussian.unwrap_or_default();
@@ -323,7 +326,7 @@ impl Scene {
             device.cmd_bind_vertex_buffers(commands, 0, &[self.splats.buffer], &[0]);
             self.gpu
                 .gaussian
-                .cmd_set_gaussian_camera(commands, &camera());
+                .cmd_set_gaussian_cameras(commands, &[camera()]);
         }
     }
 }

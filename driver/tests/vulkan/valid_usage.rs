@@ -143,7 +143,6 @@ fn pipelines() -> Vec<(&'static str, PipelineRequest<'static>)> {
 /// Pipelines that use a mode each, on a device on which none is enabled.
 fn modes() -> Vec<(&'static str, PipelineRequest<'static>)> {
     let buffer = GaussianCameraSourceGAURAST::UNIFORM_BUFFER;
-    let merge = PipelineGaussianStateCreateFlagsGAURAST::MERGE_DRAWS;
     let compensated = GaussianAntialiasingGAURAST::OPACITY_COMPENSATED;
     vec![
         (
@@ -176,8 +175,29 @@ fn modes() -> Vec<(&'static str, PipelineRequest<'static>)> {
             with(|s| s.geometry(GaussianGeometryGAURAST::GAUSSIAN_2D)),
         ),
         ("uniformBufferCamera", with(|s| s.camera_source(buffer))),
-        ("mergedDraws", with(|s| s.flags(merge))),
         ("gaussianApproximation", allowing(1e-3, 0.0)),
+        (
+            "attributeActivation",
+            with(|s| s.flags(PipelineGaussianStateCreateFlagsGAURAST::LOG_SCALE)),
+        ),
+        (
+            "sphericalHarmonicsBuffer",
+            with(|s| s.flags(PipelineGaussianStateCreateFlagsGAURAST::SPHERICAL_HARMONICS_BUFFER)),
+        ),
+        (
+            "gaussianDynamicState",
+            PipelineRequest {
+                dynamic: vec![gaurast::vk::DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST],
+                ..PipelineRequest::default()
+            },
+        ),
+        (
+            "gaussianMultiview",
+            PipelineRequest {
+                view_mask: 1,
+                ..PipelineRequest::default()
+            },
+        ),
         (
             "gaussianInstancing",
             with(|s| s.attribute_locations(s.attribute_locations.first_model_matrix(9))),
@@ -264,10 +284,13 @@ fn every_statement_is_reported_by_its_id() {
     for (id, messages) in crate::gaussian_shaders::broken() {
         heard(id, messages);
     }
+    for (id, messages) in crate::viewer_usage::broken() {
+        heard(id, messages);
+    }
     for (id, camera) in cameras() {
         let recorded = gpu.record(|_, commands| {
             // SAFETY: see the crate.
-            unsafe { gpu.gaussian.cmd_set_gaussian_camera(commands, &camera) };
+            unsafe { gpu.gaussian.cmd_set_gaussian_cameras(commands, &[camera]) };
         });
         assert_eq!(recorded.unwrap_err(), invalid, "{id}");
         heard(id, gpu.take_messages().concat());
@@ -309,7 +332,7 @@ fn flat_through_a_fisheye() -> String {
         let fisheye = camera().model(GaussianCameraModelGAURAST::FISHEYE);
         // SAFETY: see the crate.
         unsafe {
-            (scene.gpu.gaussian).cmd_set_gaussian_camera(commands, &fisheye);
+            (scene.gpu.gaussian).cmd_set_gaussian_cameras(commands, &[fisheye]);
             device.cmd_draw(commands, 1, 1, 0, 0);
         }
     });
@@ -369,7 +392,7 @@ fn a_camera_whose_feature_is_not_enabled_draws_nothing_and_says_so() {
             // SAFETY: see the crate.
             unsafe {
                 let gaussian = &scene.gpu.gaussian;
-                gaussian.cmd_set_gaussian_camera(commands, &camera().model(model));
+                gaussian.cmd_set_gaussian_cameras(commands, &[camera().model(model)]);
                 device.cmd_draw(commands, 1, 1, 0, 0);
             }
         });

@@ -43,6 +43,8 @@ pub struct Picture<'a> {
     pub samples: vk::SampleCountFlags,
     /// How many Gaussians each draw has, if not all are drawn at once.
     pub draws: &'a [u32],
+    /// They share a sorted set.
+    pub share_a_set: bool,
     /// A vertex shader projects.
     pub by_shader: bool,
     /// What makes colours of what accumulates, if not the device alone.
@@ -179,7 +181,8 @@ impl Gpu {
                 device.cmd_bind_pipeline(c, point, gaussians);
                 device.cmd_set_viewport(c, 0, &[viewport(picture, [0.0, 1.0])]);
                 device.cmd_bind_vertex_buffers(c, 0, &[splats, instances], &[0; 2]);
-                self.extension.cmd_set_gaussian_camera(c, &picture.camera);
+                self.extension
+                    .cmd_set_gaussian_cameras(c, &[picture.camera]);
                 let [fx, fy] = picture.camera.focal_length;
                 let [width, height] = picture.size.map(|side| side as f32);
                 let (vertex, constants) = (vk::ShaderStageFlags::VERTEX, [width, height, fx, fy]);
@@ -192,9 +195,15 @@ impl Gpu {
                     picture.draws
                 };
                 let (mut first, instances) = (0, picture.instances.len().max(1) as u32);
+                if picture.share_a_set {
+                    self.extension.cmd_begin_gaussian_set(c);
+                }
                 for &count in draws {
                     device.cmd_draw(c, count, instances, first, 0);
                     first += count;
+                }
+                if picture.share_a_set {
+                    self.extension.cmd_end_gaussian_set(c);
                 }
                 device.cmd_end_rendering(c);
             }

@@ -5,8 +5,7 @@ use gaurast::vk::{
     GaussianAntialiasingGAURAST as Antialiasing, GaussianCameraGAURAST as Camera,
     GaussianCameraModelGAURAST as Model, GaussianGeometryGAURAST as Geometry,
     GaussianLinearizationGAURAST as Linearization, GaussianOrderGAURAST as Order,
-    GaussianPrecisionGAURAST as Precision, PipelineGaussianStateCreateFlagsGAURAST as Flags,
-    PipelineGaussianStateCreateInfoGAURAST as State,
+    GaussianPrecisionGAURAST as Precision, PipelineGaussianStateCreateInfoGAURAST as State,
 };
 
 use crate::gpu::{Picture, Resolve, Splat, Triangle};
@@ -73,6 +72,7 @@ fn picture(splats: &[Splat], focal: f32) -> Picture<'_> {
         triangle: None,
         samples: Samples::TYPE_1,
         draws: &[],
+        share_a_set: false,
         by_shader: false,
         resolve: None,
         coverage: false,
@@ -232,8 +232,11 @@ fn merged(scenes: &Scenes) -> Room<'_> {
             drawn("draws", "draws in their order", apart()),
             drawn(
                 "draws-merged",
-                "`MERGE_DRAWS`",
-                with(apart(), |state| state.flags(Flags::MERGE_DRAWS)),
+                "`vkCmdBeginGaussianSetGAURAST`",
+                Picture {
+                    share_a_set: true,
+                    ..apart()
+                },
             ),
         ],
     }

@@ -3,7 +3,9 @@
 use super::lanes::F32_LANES;
 use super::spherical_harmonics::{COEFFICIENT_FLOATS, MAX_COEFFICIENTS};
 use crate::format::Format;
-use crate::packet::{AttributeStream, GaussianAppend, GaussianAttributes, IndexStream};
+use crate::packet::{
+    Activations, AttributeStream, GaussianAppend, GaussianAttributes, IndexStream,
+};
 use devmem::Allocation;
 use std::ops::RangeInclusive;
 use std::sync::{Arc, Weak};
@@ -197,6 +199,9 @@ impl Fetcher {
         self.read(&streams.scale, group, out.scale.each_mut());
         self.read(&streams.rotation, group, out.rotation.each_mut());
         self.read(&streams.opacity, group, [&mut out.opacity]);
+        if streams.activations != Activations::default() {
+            activate(streams.activations, group.len, out);
+        }
     }
 
     /// Multiplies a group's opacities by the model's, if it has some.
@@ -252,6 +257,23 @@ impl Fetcher {
         if self.bytes.len() < bytes {
             self.bytes.resize(bytes, 0);
         }
+    }
+}
+
+/// Makes standard deviations and opacities of what is stored, in the first `len` lanes.
+#[cold]
+fn activate(activations: Activations, len: usize, out: &mut Attributes) {
+    let apply = |lanes: &mut [f32; F32_LANES], function: fn(f64) -> f64| {
+        for value in lanes.iter_mut().take(len) {
+            *value = function(f64::from(*value)) as f32;
+        }
+    };
+    if activations.log_scale {
+        let scales = out.scale.iter_mut();
+        scales.for_each(|lanes| apply(lanes, f64::exp));
+    }
+    if activations.logit_opacity {
+        apply(&mut out.opacity, |logit| 1.0 / (1.0 + (-logit).exp()));
     }
 }
 

@@ -7,7 +7,7 @@ use super::attributes::{SourceFingerprint, is_device_local};
 use super::clusters;
 use super::clusters::{ClusterBuilder, ClusterSource, Clusters};
 use super::set::GaussianSet;
-use crate::packet::{AttributeStream, GaussianAppend};
+use crate::packet::{Activations, AttributeStream, GaussianAppend};
 use crate::runtime::Runtime;
 use crate::stats::counters::{Counter, Counters};
 use crate::stats::optimizations::Optimization;
@@ -25,6 +25,8 @@ const MAX_ENTRIES: usize = 256;
 struct Entry {
     /// Those of positions, scales, rotations, opacities and, if they are in the clusters, spherical harmonics.
     streams: Vec<SourceFingerprint>,
+    /// What is applied to them.
+    activations: Activations,
     first: u32,
     count: u32,
     /// Whether they are 2D Gaussians, whose third scale means nothing.
@@ -58,6 +60,7 @@ impl Entry {
         let streams = shapes.chain(harmonics.filter(|_| with_harmonics));
         Self {
             streams: streams.map(SourceFingerprint::new).collect(),
+            activations: attributes.activations,
             first: append.first,
             count: append.count,
             is_flat,
@@ -72,7 +75,8 @@ impl Entry {
         let mut streams = self.streams.iter().zip(&other.streams);
         let what = |entry: &Self| {
             let Self { first, count, .. } = *entry;
-            (first, count, entry.is_flat, entry.streams.len())
+            let how = (entry.is_flat, entry.activations);
+            (first, count, how, entry.streams.len())
         };
         what(self) == what(other) && streams.all(|(a, b)| a.is_same(b))
     }
@@ -81,7 +85,10 @@ impl Entry {
     /// harmonics.
     fn covers(&self, other: &Self) -> bool {
         let mut streams = self.streams.iter().zip(&other.streams);
-        let what = |entry: &Self| (entry.first, entry.count, entry.is_flat);
+        let what = |entry: &Self| {
+            let how = (entry.is_flat, entry.activations);
+            (entry.first, entry.count, how)
+        };
         what(self) == what(other)
             && self.streams.len() >= other.streams.len()
             && streams.all(|(a, b)| a.is_same(b))

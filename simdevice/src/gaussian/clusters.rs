@@ -372,6 +372,7 @@ mod tests {
                 rotation: stream(6, Format::R32G32B32A32Sfloat),
                 opacity: stream(10, Format::R32Sfloat),
                 model: ModelAttributes::default(),
+                activations: Default::default(),
                 spherical_harmonics: vec![stream(11, Format::R32G32B32Sfloat)],
             },
             indices: None,

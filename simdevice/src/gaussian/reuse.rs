@@ -2,14 +2,15 @@
 //! projected, sorted and binned.
 //!
 //! A set lives in the memory of the positions that it was made from, like clusters: it is gone when that is freed or
-//! written. A buffer has one, that of its last picture, which goes before another is made, so that there are never two.
+//! written. A buffer has one for each view, that of its last picture, which goes before another is made, so that there are
+//! never two.
 
 use super::attributes::{SourceFingerprint, is_device_local};
 use super::clusters::Clusters;
 use super::set::GaussianSet;
 use super::sorted_set::SortedSet;
 use crate::format::Format;
-use crate::packet::{AttributeStream, GaussianAppend};
+use crate::packet::{Activations, AttributeStream, GaussianAppend};
 use crate::state::gaussian::{Camera, GaussianState};
 use crate::state::{Rect, Viewport};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
@@ -21,12 +22,16 @@ pub(super) struct Key {
     streams: Vec<SourceFingerprint>,
     /// First vertex, vertices, first instance, instances of each draw.
     ranges: Vec<[u32; 4]>,
+    /// What is applied to the attributes of each.
+    activations: Vec<Activations>,
     /// The clusters of each, which its accounts depend on.
     clusters: Vec<Weak<Clusters>>,
     state: Arc<GaussianState>,
     camera: Camera,
     viewport: Viewport,
     bounds: Rect,
+    /// The view, of which each has a set of its own.
+    layer: u32,
     /// The depth attachment's format, if centres have depths.
     depth: Option<Format>,
     /// Whether a fragment program makes the colours, which what is hidden depends on.
@@ -70,6 +75,9 @@ impl Key {
                 .map(SourceFingerprint::new)
                 .collect(),
             ranges: ranges.collect(),
+            activations: (set.appends.iter())
+                .map(|append| append.attributes.activations)
+                .collect(),
             clusters: clusters
                 .iter()
                 .map(|clusters| clusters.as_ref().map_or(Weak::new(), Arc::downgrade))
@@ -78,6 +86,7 @@ impl Key {
             camera: begin.camera,
             viewport: begin.viewport,
             bounds: set.bounds,
+            layer: set.layer,
             depth: set.depth.as_ref().map(|_| set.depth_format),
             is_resolved: set.resolve.is_some(),
         })
@@ -89,7 +98,8 @@ impl Key {
         };
         let view = |key: &Self| {
             let depths = (key.depth, key.is_resolved);
-            (key.camera, key.viewport, key.bounds, depths)
+            let place = (key.bounds, key.layer);
+            (key.camera, key.viewport, place, depths)
         };
         view(self) == view(other)
             && self.state == other.state
@@ -100,13 +110,14 @@ impl Key {
     /// Whether the same places in the set are in the same groups of both.
     fn has_same_batches(&self, other: &Self) -> bool {
         let mut clusters = self.clusters.iter().zip(&other.clusters);
-        self.ranges == other.ranges && clusters.all(|(a, b)| a.ptr_eq(b))
+        let same = self.ranges == other.ranges && self.activations == other.activations;
+        same && clusters.all(|(a, b)| a.ptr_eq(b))
     }
 
-    /// Whether both draw the same buffer first.
+    /// Whether both draw the same buffer first, for the same view.
     fn is_of_same_buffer(&self, other: &Self) -> bool {
         let mut first = self.streams.iter().zip(&other.streams).take(1);
-        first.all(|(a, b)| a.is_same_buffer(b))
+        self.layer == other.layer && first.all(|(a, b)| a.is_same_buffer(b))
     }
 }
 

@@ -16,6 +16,8 @@ pub(super) const MAX_GROUPS: u64 = (1 << 32) / GROUP as u64;
 #[derive(Debug)]
 pub struct GaussianSet {
     pub(super) begin: GaussianBegin,
+    /// The layer that it is drawn to, which is its view.
+    pub(super) layer: u32,
     pub(super) bounds: Rect,
     pub(super) depth: Option<CenterDepth>,
     /// What depths are rounded to.
@@ -69,6 +71,7 @@ impl GaussianSet {
             .intersect(viewport_pixels(&begin.viewport));
         Self {
             begin: begin.clone(),
+            layer: 0,
             bounds: visible,
             depth: depth
                 .filter(|_| begin.state.depth_stencil.depth.is_some())
@@ -77,6 +80,26 @@ impl GaussianSet {
             resolve: None,
             appends: Vec::new(),
             draws: Vec::new(),
+        }
+    }
+
+    /// Starts the set of view `layer`, which is number `number` of the pass's views.
+    pub fn begin_view(
+        begin: &GaussianBegin,
+        (number, layer): (usize, u32),
+        area: Rect,
+        depth: Option<Format>,
+    ) -> Self {
+        let own = number.checked_sub(1);
+        let camera = own.and_then(|number| begin.further_cameras.get(number));
+        let begin = GaussianBegin {
+            camera: camera.copied().unwrap_or(begin.camera),
+            further_cameras: Vec::new(),
+            ..begin.clone()
+        };
+        Self {
+            layer,
+            ..Self::begin(&begin, area, depth)
         }
     }
 

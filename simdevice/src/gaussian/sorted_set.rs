@@ -43,6 +43,8 @@ pub struct BinnedDraw {
     pub state: Arc<GaussianState>,
     /// The pixels that it may touch.
     pub bounds: Rect,
+    /// The layer that it is drawn to.
+    pub(crate) layer: u32,
     pub(crate) sorted: Arc<SortedSet>,
     /// What is left out in its tiles.
     pub(crate) optimizations: Optimizations,
@@ -120,6 +122,7 @@ impl BinnedDraw {
             rays: PixelRays::new(&begin.camera, &begin.viewport),
             state: begin.state,
             bounds: set.bounds,
+            layer: set.layer,
             sorted,
             optimizations: runtime.config().optimizations,
             record,

@@ -135,7 +135,7 @@ fn project(
     let prepared = draw.vertex_bindings.bind(runtime.level());
     let (resources, cancel) = (prepared.resources(), AtomicBool::new(false));
     let worker = || {
-        let shader = PointShader::new(draw, runtime, &resources, &cancel);
+        let shader = PointShader::new(draw, set.layer, runtime, &resources, &cancel);
         Worker {
             shading: Shading::new(set, viewport, &shader, runtime),
             shader,

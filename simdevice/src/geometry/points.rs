@@ -21,9 +21,10 @@ pub(crate) struct PointShader<'a> {
 }
 
 impl<'a> PointShader<'a> {
-    /// Makes a machine ready. `cancel` stops it.
+    /// Makes a machine ready, for view number `view`. `cancel` stops it.
     pub(crate) fn new(
         draw: &'a Draw,
+        view: u32,
         runtime: &Runtime,
         resources: &'a Resources<'a>,
         cancel: &'a AtomicBool,
@@ -33,7 +34,7 @@ impl<'a> PointShader<'a> {
         Self {
             draw,
             shader: Shader {
-                fetcher: Fetcher::new(draw, 0, &mut machine),
+                fetcher: Fetcher::new(draw, view, &mut machine),
                 machine,
                 outputs: &program.outputs,
                 takes_optional: false,

@@ -8,16 +8,28 @@ use crate::state::{Rect, Viewport};
 use std::sync::Arc;
 
 /// See [`Packet::GaussianBegin`].
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct GaussianBegin {
     /// What the pipeline fixes.
     pub state: Arc<GaussianState>,
-    /// The camera, which means nothing to what a vertex program projects.
+    /// The camera, which means nothing to what a vertex program projects. In a pass with views it is that of the first
+    /// one, and of all without one of their own.
     pub camera: Camera,
+    /// The cameras of the other views of the pass, in their order.
+    pub further_cameras: Vec<Camera>,
     /// The viewport; its width and height are the W and H of the projection.
     pub viewport: Viewport,
     /// Pixels outside are not touched.
     pub scissor: Rect,
+}
+
+/// The functions that are applied to attributes as they are read, in binary64, rounded once to binary32.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Activations {
+    /// Standard deviations are exponentials of what is stored.
+    pub log_scale: bool,
+    /// Opacities are `1 / (1 + exp(-x))` of what is stored.
+    pub logit_opacity: bool,
 }
 
 /// The vertex attributes of fixed-function projection.
@@ -33,6 +45,8 @@ pub struct GaussianAttributes {
     pub opacity: AttributeStream,
     /// `(degree + 1)^2` spherical harmonics coefficients of red, green and blue.
     pub spherical_harmonics: Vec<AttributeStream>,
+    /// What standard deviations and opacities are of what is stored.
+    pub activations: Activations,
     /// What is done to them, usually by instance.
     pub model: ModelAttributes,
 }

@@ -12,7 +12,8 @@ pub use command::Packet;
 pub use devmem::BufferRange;
 pub use draw::{Dispatch, Draw};
 pub use gaussian::{
-    GaussianAppend, GaussianAttributes, GaussianBegin, GaussianFragmentStage, ModelAttributes,
+    Activations, GaussianAppend, GaussianAttributes, GaussianBegin, GaussianFragmentStage,
+    ModelAttributes,
 };
 pub use rendering::{Attachment, AttachmentClear, ClearAttachments, LoadOp, Rendering, StoreOp};
 pub use streams::{AttributeStream, IndexStream};

@@ -127,6 +127,7 @@ pub fn gaussians_in(host_visible: bool, seed: u64, count: u32, blend: BlendState
             rotation: stream(6, Format::R32G32B32A32Sfloat),
             opacity: stream(10, Format::R32Sfloat),
             model: ModelAttributes::default(),
+            activations: Default::default(),
             spherical_harmonics: vec![stream(11, Format::R32G32B32Sfloat)],
         },
         indices: None,
@@ -150,6 +151,7 @@ pub fn begin(blend: BlendState) -> GaussianBegin {
             blend_constants: [0.5, 0.25, 0.75, 0.5],
             ..GaussianState::default()
         }),
+        further_cameras: Vec::new(),
         camera: Camera {
             model: CameraModel::Pinhole,
             rotation: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],

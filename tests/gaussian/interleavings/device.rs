@@ -178,6 +178,7 @@ fn attributes(scene: &SceneBuffers) -> GaussianAttributes {
         rotation: stream(&buffer(&scene.rotations), 16, 0, Format::R32G32B32A32Sfloat),
         opacity: stream(&buffer(&scene.opacities), 4, 0, Format::R32Sfloat),
         model: ModelAttributes::default(),
+        activations: Default::default(),
         spherical_harmonics: vec![triples(&scene.sh)],
     }
 }
@@ -483,6 +484,7 @@ fn gaussians(
             blend: vec![blend(true)],
             ..GaussianState::default()
         }),
+        further_cameras: Vec::new(),
         camera: Camera {
             model: CameraModel::Pinhole,
             rotation: camera.rotation,

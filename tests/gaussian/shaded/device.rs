@@ -125,6 +125,7 @@ pub fn append(scene: &SceneBuffers) -> GaussianAppend {
             opacity: stream(buffer(&scene.opacities), 4, Format::R32Sfloat),
             spherical_harmonics: vec![triples(&scene.sh)],
             model: ModelAttributes::default(),
+            activations: Default::default(),
         },
         indices: None,
         first: 0,
@@ -385,6 +386,7 @@ impl Case<'_> {
         packets.push(Packet::GaussianBegin(Box::new(GaussianBegin {
             state: Arc::new(self.state()),
             camera,
+            further_cameras: Vec::new(),
             viewport: Viewport {
                 x: 0.0,
                 y: 0.0,

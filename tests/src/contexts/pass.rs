@@ -102,8 +102,18 @@ impl<'a> Commands<'a> {
             device.cmd_bind_pipeline(self.raw, bind_point, pipeline.raw);
             device.cmd_bind_vertex_buffers(self.raw, 0, &buffers, &[0; 5]);
             let gaussian = self.context.gaussian();
-            gaussian.cmd_set_gaussian_camera(self.raw, camera);
+            gaussian.cmd_set_gaussian_cameras(self.raw, &[*camera]);
         }
+    }
+
+    /// Records draws that share a sorted set.
+    pub fn gaussian_set(&self, draws: impl FnOnce()) {
+        let gaussian = self.context.gaussian();
+        // SAFETY: see `contexts`.
+        unsafe { gaussian.cmd_begin_gaussian_set(self.raw) };
+        draws();
+        // SAFETY: see `contexts`.
+        unsafe { gaussian.cmd_end_gaussian_set(self.raw) };
     }
 
     /// Binds what a pipeline with [`PipelineOptions::instances`](super::PipelineOptions::instances) needs besides.

@@ -6,9 +6,9 @@ use std::sync::Arc;
 use simdevice::format::{Aspect, ClearValue};
 use simdevice::image::{ImageDesc, ImageKind};
 use simdevice::packet::{
-    Attachment, AttachmentClear, AttributeStream, BlitImage, BufferCopyRegion, BufferImageRegion,
-    BufferRange, ClearAttachments, ClearImage, CopyBuffer, CopyBufferImage, CopyImage,
-    GaussianAppend, GaussianAttributes, GaussianBegin, ImageBlitRegion, ImageCopyRegion,
+    Activations, Attachment, AttachmentClear, AttributeStream, BlitImage, BufferCopyRegion,
+    BufferImageRegion, BufferRange, ClearAttachments, ClearImage, CopyBuffer, CopyBufferImage,
+    CopyImage, GaussianAppend, GaussianAttributes, GaussianBegin, ImageBlitRegion, ImageCopyRegion,
     IndexStream, LoadOp, ModelAttributes, Rendering, ResolveImage, StoreOp, SubresourceLayers,
     SubresourceRange,
 };
@@ -500,6 +500,7 @@ fn begin(bytes: &mut Bytes<'_>) -> Packet {
     let rotation = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0f32];
     Packet::GaussianBegin(Box::new(GaussianBegin {
         state: Arc::new(state),
+        further_cameras: Vec::new(),
         camera: Camera {
             model: bytes.one(&[
                 CameraModel::Pinhole,
@@ -550,6 +551,10 @@ fn append(bytes: &mut Bytes<'_>, resources: &Resources) -> Packet {
             rotation: stream(bytes, Format::R32G32B32A32Sfloat),
             opacity: stream(bytes, Format::R32Sfloat),
             model,
+            activations: Activations {
+                log_scale: bytes.rarely(8),
+                logit_opacity: bytes.rarely(8),
+            },
             spherical_harmonics: vec![stream(bytes, triple)],
         },
         indices: bytes.rarely(4).then(|| IndexStream {

@@ -71,6 +71,7 @@ impl Default for PipelineGaussianStateCreateInfoGAURAST<'_> {
             camera_source: GaussianCameraSourceGAURAST::COMMAND,
             camera_set: 0,
             camera_binding: 0,
+            camera_count: 1,
             _marker: PhantomData,
         }
     }

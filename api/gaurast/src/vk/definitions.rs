@@ -45,6 +45,64 @@ pub const STRUCTURE_TYPE_GAUSSIAN_CAMERA_GAURAST: vk::StructureType =
 pub const STRUCTURE_TYPE_PIPELINE_GAUSSIAN_APPROXIMATION_STATE_CREATE_INFO_GAURAST:
     vk::StructureType = vk::StructureType::from_raw(1_000_997_004);
 
+/// `VK_STRUCTURE_TYPE_GAUSSIAN_SPHERICAL_HARMONICS_BUFFER_GAURAST`.
+#[doc(alias = "VK_STRUCTURE_TYPE_GAUSSIAN_SPHERICAL_HARMONICS_BUFFER_GAURAST")]
+pub const STRUCTURE_TYPE_GAUSSIAN_SPHERICAL_HARMONICS_BUFFER_GAURAST: vk::StructureType =
+    vk::StructureType::from_raw(1_000_997_005);
+
+/// [`PipelineGaussianStateCreateInfoGAURAST::order`] is set by `vkCmdSetGaussianOrderGAURAST`.
+#[doc(alias = "VK_DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST")]
+pub const DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST: vk::DynamicState =
+    vk::DynamicState::from_raw(1_000_997_000);
+
+/// [`PipelineGaussianStateCreateInfoGAURAST::antialiasing`] is set by
+/// `vkCmdSetGaussianAntialiasingGAURAST`.
+#[doc(alias = "VK_DYNAMIC_STATE_GAUSSIAN_ANTIALIASING_GAURAST")]
+pub const DYNAMIC_STATE_GAUSSIAN_ANTIALIASING_GAURAST: vk::DynamicState =
+    vk::DynamicState::from_raw(1_000_997_001);
+
+/// [`PipelineGaussianStateCreateInfoGAURAST::low_pass_variance`] is set by
+/// `vkCmdSetGaussianLowPassVarianceGAURAST`.
+#[doc(alias = "VK_DYNAMIC_STATE_GAUSSIAN_LOW_PASS_VARIANCE_GAURAST")]
+pub const DYNAMIC_STATE_GAUSSIAN_LOW_PASS_VARIANCE_GAURAST: vk::DynamicState =
+    vk::DynamicState::from_raw(1_000_997_002);
+
+/// [`PipelineGaussianStateCreateInfoGAURAST::alpha_floor`] is set by
+/// `vkCmdSetGaussianAlphaFloorGAURAST`.
+#[doc(alias = "VK_DYNAMIC_STATE_GAUSSIAN_ALPHA_FLOOR_GAURAST")]
+pub const DYNAMIC_STATE_GAUSSIAN_ALPHA_FLOOR_GAURAST: vk::DynamicState =
+    vk::DynamicState::from_raw(1_000_997_003);
+
+/// [`PipelineGaussianStateCreateInfoGAURAST::alpha_ceiling`] is set by
+/// `vkCmdSetGaussianAlphaCeilingGAURAST`.
+#[doc(alias = "VK_DYNAMIC_STATE_GAUSSIAN_ALPHA_CEILING_GAURAST")]
+pub const DYNAMIC_STATE_GAUSSIAN_ALPHA_CEILING_GAURAST: vk::DynamicState =
+    vk::DynamicState::from_raw(1_000_997_004);
+
+/// [`PipelineGaussianStateCreateInfoGAURAST::transmittance_floor`] is set by
+/// `vkCmdSetGaussianTransmittanceFloorGAURAST`.
+#[doc(alias = "VK_DYNAMIC_STATE_GAUSSIAN_TRANSMITTANCE_FLOOR_GAURAST")]
+pub const DYNAMIC_STATE_GAUSSIAN_TRANSMITTANCE_FLOOR_GAURAST: vk::DynamicState =
+    vk::DynamicState::from_raw(1_000_997_005);
+
+/// [`PipelineGaussianStateCreateInfoGAURAST::spherical_harmonics_degree`] is set by
+/// `vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST`.
+#[doc(alias = "VK_DYNAMIC_STATE_GAUSSIAN_SPHERICAL_HARMONICS_DEGREE_GAURAST")]
+pub const DYNAMIC_STATE_GAUSSIAN_SPHERICAL_HARMONICS_DEGREE_GAURAST: vk::DynamicState =
+    vk::DynamicState::from_raw(1_000_997_006);
+
+/// [`PipelineGaussianApproximationStateCreateInfoGAURAST::exponential_error`] is set by
+/// `vkCmdSetGaussianExponentialErrorGAURAST`.
+#[doc(alias = "VK_DYNAMIC_STATE_GAUSSIAN_EXPONENTIAL_ERROR_GAURAST")]
+pub const DYNAMIC_STATE_GAUSSIAN_EXPONENTIAL_ERROR_GAURAST: vk::DynamicState =
+    vk::DynamicState::from_raw(1_000_997_007);
+
+/// [`PipelineGaussianApproximationStateCreateInfoGAURAST::contribution_budget`] is set by
+/// `vkCmdSetGaussianContributionBudgetGAURAST`.
+#[doc(alias = "VK_DYNAMIC_STATE_GAUSSIAN_CONTRIBUTION_BUDGET_GAURAST")]
+pub const DYNAMIC_STATE_GAUSSIAN_CONTRIBUTION_BUDGET_GAURAST: vk::DynamicState =
+    vk::DynamicState::from_raw(1_000_997_008);
+
 vk_enum! {
     /// The place where the nine numbers come from that the rasterizer takes per Gaussian (mean 2,
     /// covariance 3, opacity 1, colour 3).
@@ -144,7 +202,7 @@ vk_enum! {
     /// The place where a pipeline's draws take their camera from.
     #[doc(alias = "VkGaussianCameraSourceGAURAST")]
     pub struct GaussianCameraSourceGAURAST {
-        /// From the command buffer's state, set by `vkCmdSetGaussianCameraGAURAST`.
+        /// From the command buffer's state, set by `vkCmdSetGaussianCamerasGAURAST`.
         #[doc(alias = "VK_GAUSSIAN_CAMERA_SOURCE_COMMAND_GAURAST")]
         COMMAND = 0,
         /// From a uniform buffer, read when the draw executes: reused command buffers and cameras
@@ -179,15 +237,23 @@ vk_enum! {
 }
 
 vk_flags! {
-    /// A pipeline's switches.
+    /// The functions that are applied to attributes before anything else, and the place of
+    /// spherical harmonics. Fixed-function projection only.
     #[doc(alias = "VkPipelineGaussianStateCreateFlagsGAURAST")]
     pub struct PipelineGaussianStateCreateFlagsGAURAST {
-        /// Consecutive draws with this pipeline share one sorted set, as if they were one draw.
-        /// Between them only vertex buffers, the index buffer, and (with vertex-shader projection)
-        /// descriptor sets and push constants may change; any other state change, command or draw, and
-        /// the end of the subpass, ends the set. Needs `mergedDraws`.
-        #[doc(alias = "VK_PIPELINE_GAUSSIAN_STATE_CREATE_MERGE_DRAWS_BIT_GAURAST")]
-        MERGE_DRAWS = 1,
+        /// The scale attribute holds logarithms, as trained files do: the standard deviations are
+        /// exp(x). Needs `attributeActivation`.
+        #[doc(alias = "VK_PIPELINE_GAUSSIAN_STATE_CREATE_LOG_SCALE_BIT_GAURAST")]
+        LOG_SCALE = 1,
+        /// The opacity attribute holds logits, as trained files do: the opacity is 1 / (1 + exp(-x)).
+        /// Needs `attributeActivation`.
+        #[doc(alias = "VK_PIPELINE_GAUSSIAN_STATE_CREATE_LOGIT_OPACITY_BIT_GAURAST")]
+        LOGIT_OPACITY = 2,
+        /// Spherical harmonics are no attributes, but come from the buffer that
+        /// `vkCmdBindGaussianSphericalHarmonicsGAURAST` binds: `firstSphericalHarmonics` is ignored.
+        /// Needs `sphericalHarmonicsBuffer`.
+        #[doc(alias = "VK_PIPELINE_GAUSSIAN_STATE_CREATE_SPHERICAL_HARMONICS_BUFFER_BIT_GAURAST")]
+        SPHERICAL_HARMONICS_BUFFER = 4,
     }
 }
 
@@ -233,7 +299,8 @@ pub struct PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'a> {
     pub gaussian_2d: vk::Bool32,
     /// [`GaussianCameraSourceGAURAST::UNIFORM_BUFFER`].
     pub uniform_buffer_camera: vk::Bool32,
-    /// [`PipelineGaussianStateCreateFlagsGAURAST::MERGE_DRAWS`].
+    /// `vkCmdBeginGaussianSetGAURAST` and `vkCmdEndGaussianSetGAURAST`: draws that share a sorted
+    /// set.
     pub merged_draws: vk::Bool32,
     /// The `firstModelMatrix` and `modelOpacity` attributes, which place and fade a whole model
     /// per instance. (Instanced draws without them need no feature.)
@@ -244,6 +311,15 @@ pub struct PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'a> {
     pub gaussian_multisample: vk::Bool32,
     /// [`PipelineGaussianApproximationStateCreateInfoGAURAST`] with numbers other than 0.
     pub gaussian_approximation: vk::Bool32,
+    /// Gaussian pipelines with a view mask other than 0, and a camera for each view.
+    pub gaussian_multiview: vk::Bool32,
+    /// [`PipelineGaussianStateCreateFlagsGAURAST::LOG_SCALE`] and
+    /// [`PipelineGaussianStateCreateFlagsGAURAST::LOGIT_OPACITY`].
+    pub attribute_activation: vk::Bool32,
+    /// [`PipelineGaussianStateCreateFlagsGAURAST::SPHERICAL_HARMONICS_BUFFER`].
+    pub spherical_harmonics_buffer: vk::Bool32,
+    /// The dynamic states [`DYNAMIC_STATE_GAUSSIAN_..._GAURAST`] in Gaussian pipelines.
+    pub gaussian_dynamic_state: vk::Bool32,
     /// The lifetime of the `p_next` chain.
     pub _marker: PhantomData<&'a ()>,
 }
@@ -280,6 +356,10 @@ impl Default for PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_> {
             gaussian_depth_stencil: vk::Bool32::default(),
             gaussian_multisample: vk::Bool32::default(),
             gaussian_approximation: vk::Bool32::default(),
+            gaussian_multiview: vk::Bool32::default(),
+            attribute_activation: vk::Bool32::default(),
+            spherical_harmonics_buffer: vk::Bool32::default(),
+            gaussian_dynamic_state: vk::Bool32::default(),
             _marker: PhantomData,
         }
     }
@@ -306,10 +386,14 @@ impl PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_> {
         gaussian_depth_stencil,
         gaussian_multisample,
         gaussian_approximation,
+        gaussian_multiview,
+        attribute_activation,
+        spherical_harmonics_buffer,
+        gaussian_dynamic_state,
     }
 }
 
-/// The device's shape and limits.
+/// The device's limits.
 ///
 /// Chain it to `VkPhysicalDeviceProperties2`. Vertex attributes are limited as ever by
 /// `maxVertexInputAttributes`, which is at least 32: degree 3 takes 20 locations, degree 4
@@ -323,21 +407,18 @@ pub struct PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'a> {
     pub s_type: vk::StructureType,
     /// The next structure of the chain, or null.
     pub p_next: *mut c_void,
-    /// The tile for which the device keeps one list of Gaussians, in pixels. A hint: no image
-    /// depends on it.
+    /// The tile for which the device keeps one list of Gaussians, in pixels; at least 1 x 1. A
+    /// hint: no image depends on it.
     pub tile_size: vk::Extent2D,
-    /// The number of rasterizer modules. A module works on one tile at a time.
-    pub rasterizer_module_count: u32,
-    /// The number of processing elements of each rasterizer module.
-    pub processing_element_count: u32,
-    /// The greatest `sphericalHarmonicsDegree` of a pipeline; at least 3.
+    /// The greatest `sphericalHarmonicsDegree` of a pipeline; at least 3, at most 4.
     pub max_spherical_harmonics_degree: u32,
-    /// The sample counts that Gaussian pipelines may use; only `VK_SAMPLE_COUNT_1_BIT` without
-    /// `gaussianMultisample`.
+    /// The sample counts that Gaussian pipelines may use: `VK_SAMPLE_COUNT_1_BIT`, with
+    /// `gaussianMultisample` also `VK_SAMPLE_COUNT_4_BIT`, and perhaps others.
     pub gaussian_sample_counts: vk::SampleCountFlags,
-    /// The most Gaussians, over all instances, of one draw.
+    /// The most Gaussians, over all instances, of one draw; at least 2^24 - 1.
     pub max_gaussians_per_draw: u64,
-    /// The most Gaussians of all the draws that share one sorted set.
+    /// The most Gaussians of all the draws that share one sorted set; at least
+    /// `max_gaussians_per_draw`.
     pub max_gaussians_per_set: u64,
     /// The lifetime of the `p_next` chain.
     pub _marker: PhantomData<&'a ()>,
@@ -356,8 +437,6 @@ impl Default for PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_> {
             s_type: <Self as vk::TaggedStructure>::STRUCTURE_TYPE,
             p_next: core::ptr::null_mut(),
             tile_size: vk::Extent2D::default(),
-            rasterizer_module_count: u32::default(),
-            processing_element_count: u32::default(),
             max_spherical_harmonics_degree: u32::default(),
             gaussian_sample_counts: vk::SampleCountFlags::default(),
             max_gaussians_per_draw: u64::default(),
@@ -370,8 +449,6 @@ impl Default for PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_> {
 impl PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_> {
     setters! {
         tile_size: vk::Extent2D,
-        rasterizer_module_count: u32,
-        processing_element_count: u32,
         max_spherical_harmonics_degree: u32,
         gaussian_sample_counts: vk::SampleCountFlags,
         max_gaussians_per_draw: u64,
@@ -391,14 +468,17 @@ impl PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_> {
 pub struct GaussianAttributeLocationsGAURAST {
     /// The mean p, 3 components, in world space (or model space, with a model matrix). Required.
     pub position: u32,
-    /// The standard deviations along the Gaussian's own axes, 3 components, in units of length:
-    /// linear, so exp of what trained files hold. Required. A 2D Gaussian reads the first two.
+    /// The standard deviations along the Gaussian's own axes, 3 components, in units of length, or
+    /// with [`PipelineGaussianStateCreateFlagsGAURAST::LOG_SCALE`] their logarithms, as trained
+    /// files hold them. Required. A 2D Gaussian reads the first two.
     pub scale: u32,
     /// The rotation from the Gaussian's own axes to those of `position`, a quaternion of 4
     /// components in the order w, x, y, z, as trained files hold it. It need not be normalised;
     /// the device normalises. Required.
     pub rotation: u32,
-    /// The opacity, 1 component: linear, so the sigmoid of what trained files hold. Required.
+    /// The opacity, 1 component, or with
+    /// [`PipelineGaussianStateCreateFlagsGAURAST::LOGIT_OPACITY`] its logit, as trained files hold
+    /// it. Required.
     pub opacity: u32,
     /// The first of the (degree + 1)^2 consecutive locations of the spherical harmonics'
     /// coefficients, each 3 components (red, green, blue), in the order and with the signs of
@@ -534,10 +614,15 @@ pub struct PipelineGaussianStateCreateInfoGAURAST<'a> {
     /// The descriptor set of the camera's uniform buffer. Camera source
     /// [`GaussianCameraSourceGAURAST::UNIFORM_BUFFER`] only.
     pub camera_set: u32,
-    /// The binding of the camera's uniform buffer, which holds a [`GaussianCameraDataGAURAST`] at
-    /// its start. The pipeline layout must have it as a (dynamic) uniform buffer visible to the
-    /// vertex stage. Camera source [`GaussianCameraSourceGAURAST::UNIFORM_BUFFER`] only.
+    /// The binding of the cameras' uniform buffer, which holds `camera_count` of
+    /// [`GaussianCameraDataGAURAST`] at its start. The pipeline layout must have it as a (dynamic)
+    /// uniform buffer visible to the vertex stage. Camera source
+    /// [`GaussianCameraSourceGAURAST::UNIFORM_BUFFER`] only.
     pub camera_binding: u32,
+    /// The number of cameras in the uniform buffer: 1, for all views, or more than the greatest
+    /// view index of the pipeline's view mask, so that view i sees through camera i. Camera source
+    /// [`GaussianCameraSourceGAURAST::UNIFORM_BUFFER`] only.
+    pub camera_count: u32,
     /// The lifetime of the `p_next` chain.
     pub _marker: PhantomData<&'a ()>,
 }
@@ -568,6 +653,7 @@ impl PipelineGaussianStateCreateInfoGAURAST<'_> {
         camera_source: GaussianCameraSourceGAURAST,
         camera_set: u32,
         camera_binding: u32,
+        camera_count: u32,
     }
 }
 
@@ -628,7 +714,7 @@ impl PipelineGaussianApproximationStateCreateInfoGAURAST<'_> {
     }
 }
 
-/// A camera, for `vkCmdSetGaussianCameraGAURAST`.
+/// A camera, for `vkCmdSetGaussianCamerasGAURAST`.
 ///
 /// A world-space point p has camera coordinates t = `rotation` (p - `eye`), with +x right, +y
 /// down and +z forward in the picture. [`GaussianCameraModelGAURAST`] says how t becomes a
@@ -648,24 +734,24 @@ pub struct GaussianCameraGAURAST<'a> {
     pub s_type: vk::StructureType,
     /// The next structure of the chain, or null.
     pub p_next: *const c_void,
+    /// The camera's position in world space; double, so that scenes far from the origin lose
+    /// nothing.
+    pub eye: [f64; 3],
     /// The way in which camera coordinates become pixels.
     pub model: GaussianCameraModelGAURAST,
     /// The rotation from world to camera axes, row-major: the rows are the directions right, down
     /// and forward in world space. Orthonormal; it may mirror, for left-handed worlds.
     pub rotation: [f32; 9],
-    /// The camera's position in world space; double, so that scenes far from the origin lose
-    /// nothing.
-    pub eye: [f64; 3],
     /// fx and fy; positive. Pixels, pixels per unit of length, or pixels per radian, by the model.
     pub focal_length: [f32; 2],
     /// cx and cy in pixels: where the point straight ahead appears.
     pub principal_point: [f32; 2],
+    /// c0 and c1.
+    pub depth_coefficients: [f32; 2],
     /// The least z, exclusive; greater than 0 unless the camera is orthographic. 0.2 in 3DGS.
     pub near_plane: f32,
     /// The greatest z, exclusive; greater than `near_plane`. It may be infinite.
     pub far_plane: f32,
-    /// c0 and c1.
-    pub depth_coefficients: [f32; 2],
     /// The lifetime of the `p_next` chain.
     pub _marker: PhantomData<&'a ()>,
 }
@@ -674,22 +760,84 @@ tagged_structure!(GaussianCameraGAURAST = STRUCTURE_TYPE_GAUSSIAN_CAMERA_GAURAST
 
 impl GaussianCameraGAURAST<'_> {
     setters! {
+        eye: [f64; 3],
         model: GaussianCameraModelGAURAST,
         rotation: [f32; 9],
-        eye: [f64; 3],
         focal_length: [f32; 2],
         principal_point: [f32; 2],
+        depth_coefficients: [f32; 2],
         near_plane: f32,
         far_plane: f32,
-        depth_coefficients: [f32; 2],
     }
 }
 
-/// The camera as a uniform buffer holds it, 112 bytes.
+/// The buffer that spherical harmonics are read from, for
+/// `vkCmdBindGaussianSphericalHarmonicsGAURAST`.
 ///
-/// The meaning is that of [`GaussianCameraGAURAST`]. The layout is this one whatever block
-/// layout the shaders use, and it equals the std140 and std430 layouts of the block
-/// `GaussianCamera` in the extension's specification.
+/// Coefficient k of the Gaussian that is vertex i begins at byte i `stride` + k
+/// `coefficient_stride` from `device_address` on. What lies beyond `size` reads as zeros.
+#[doc(alias = "VkGaussianSphericalHarmonicsBufferGAURAST")]
+#[repr(C)]
+#[derive(Copy, Clone, Debug)]
+#[must_use]
+pub struct GaussianSphericalHarmonicsBufferGAURAST<'a> {
+    /// The structure's type.
+    pub s_type: vk::StructureType,
+    /// The next structure of the chain, or null.
+    pub p_next: *const c_void,
+    /// The address of the first byte, in a buffer that was created for
+    /// `VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT` and is bound to memory.
+    pub device_address: vk::DeviceAddress,
+    /// The number of bytes that may be read.
+    pub size: vk::DeviceSize,
+    /// The format of a coefficient: one that vertex attributes may have, with 3 components or
+    /// more, and no integers.
+    pub format: vk::Format,
+    /// The number of bytes from a Gaussian to the next.
+    pub stride: u32,
+    /// The number of bytes from a coefficient to the next.
+    pub coefficient_stride: vk::DeviceSize,
+    /// The lifetime of the `p_next` chain.
+    pub _marker: PhantomData<&'a ()>,
+}
+
+tagged_structure!(
+    GaussianSphericalHarmonicsBufferGAURAST =
+        STRUCTURE_TYPE_GAUSSIAN_SPHERICAL_HARMONICS_BUFFER_GAURAST
+);
+
+impl Default for GaussianSphericalHarmonicsBufferGAURAST<'_> {
+    #[inline]
+    fn default() -> Self {
+        Self {
+            s_type: <Self as vk::TaggedStructure>::STRUCTURE_TYPE,
+            p_next: core::ptr::null(),
+            device_address: vk::DeviceAddress::default(),
+            size: vk::DeviceSize::default(),
+            format: vk::Format::default(),
+            stride: u32::default(),
+            coefficient_stride: vk::DeviceSize::default(),
+            _marker: PhantomData,
+        }
+    }
+}
+
+impl GaussianSphericalHarmonicsBufferGAURAST<'_> {
+    setters! {
+        device_address: vk::DeviceAddress,
+        size: vk::DeviceSize,
+        format: vk::Format,
+        stride: u32,
+        coefficient_stride: vk::DeviceSize,
+    }
+}
+
+/// A camera as a uniform buffer holds it, 128 bytes: an element of the array of a pipeline's
+/// cameras.
+///
+/// Members and meaning are those of [`GaussianCameraGAURAST`]. The layout is this one whatever
+/// block layout the shaders use, and it equals that of an array of the structure
+/// `GaussianCamera` of the extension's specification in std140 and std430.
 ///
 /// A shader without 64-bit floats writes the eye as three pairs of words, low word first.
 #[doc(alias = "VkGaussianCameraDataGAURAST")]
@@ -715,6 +863,8 @@ pub struct GaussianCameraDataGAURAST {
     pub near_plane: f32,
     /// As [`GaussianCameraGAURAST::far_plane`].
     pub far_plane: f32,
+    /// Not read: an element of an array takes 128 bytes.
+    pub padding: [u32; 4],
 }
 
 impl GaussianCameraDataGAURAST {
@@ -728,12 +878,78 @@ impl GaussianCameraDataGAURAST {
         depth_coefficients: [f32; 2],
         near_plane: f32,
         far_plane: f32,
+        padding: [u32; 4],
     }
 }
 
-/// The type of `vkCmdSetGaussianCameraGAURAST`.
+/// The type of `vkCmdSetGaussianCamerasGAURAST`.
 #[allow(non_camel_case_types)]
-pub type PFN_vkCmdSetGaussianCameraGAURAST = unsafe extern "system" fn(
+pub type PFN_vkCmdSetGaussianCamerasGAURAST = unsafe extern "system" fn(
     command_buffer: vk::CommandBuffer,
-    p_camera: *const GaussianCameraGAURAST<'_>,
+    camera_count: u32,
+    p_cameras: *const GaussianCameraGAURAST<'_>,
+);
+
+/// The type of `vkCmdBeginGaussianSetGAURAST`.
+#[allow(non_camel_case_types)]
+pub type PFN_vkCmdBeginGaussianSetGAURAST =
+    unsafe extern "system" fn(command_buffer: vk::CommandBuffer);
+
+/// The type of `vkCmdEndGaussianSetGAURAST`.
+#[allow(non_camel_case_types)]
+pub type PFN_vkCmdEndGaussianSetGAURAST =
+    unsafe extern "system" fn(command_buffer: vk::CommandBuffer);
+
+/// The type of `vkCmdSetGaussianOrderGAURAST`.
+#[allow(non_camel_case_types)]
+pub type PFN_vkCmdSetGaussianOrderGAURAST =
+    unsafe extern "system" fn(command_buffer: vk::CommandBuffer, order: GaussianOrderGAURAST);
+
+/// The type of `vkCmdSetGaussianAntialiasingGAURAST`.
+#[allow(non_camel_case_types)]
+pub type PFN_vkCmdSetGaussianAntialiasingGAURAST = unsafe extern "system" fn(
+    command_buffer: vk::CommandBuffer,
+    antialiasing: GaussianAntialiasingGAURAST,
+);
+
+/// The type of `vkCmdSetGaussianLowPassVarianceGAURAST`.
+#[allow(non_camel_case_types)]
+pub type PFN_vkCmdSetGaussianLowPassVarianceGAURAST =
+    unsafe extern "system" fn(command_buffer: vk::CommandBuffer, low_pass_variance: f32);
+
+/// The type of `vkCmdSetGaussianAlphaFloorGAURAST`.
+#[allow(non_camel_case_types)]
+pub type PFN_vkCmdSetGaussianAlphaFloorGAURAST =
+    unsafe extern "system" fn(command_buffer: vk::CommandBuffer, alpha_floor: f32);
+
+/// The type of `vkCmdSetGaussianAlphaCeilingGAURAST`.
+#[allow(non_camel_case_types)]
+pub type PFN_vkCmdSetGaussianAlphaCeilingGAURAST =
+    unsafe extern "system" fn(command_buffer: vk::CommandBuffer, alpha_ceiling: f32);
+
+/// The type of `vkCmdSetGaussianTransmittanceFloorGAURAST`.
+#[allow(non_camel_case_types)]
+pub type PFN_vkCmdSetGaussianTransmittanceFloorGAURAST =
+    unsafe extern "system" fn(command_buffer: vk::CommandBuffer, transmittance_floor: f32);
+
+/// The type of `vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST`.
+#[allow(non_camel_case_types)]
+pub type PFN_vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST =
+    unsafe extern "system" fn(command_buffer: vk::CommandBuffer, spherical_harmonics_degree: u32);
+
+/// The type of `vkCmdSetGaussianExponentialErrorGAURAST`.
+#[allow(non_camel_case_types)]
+pub type PFN_vkCmdSetGaussianExponentialErrorGAURAST =
+    unsafe extern "system" fn(command_buffer: vk::CommandBuffer, exponential_error: f32);
+
+/// The type of `vkCmdSetGaussianContributionBudgetGAURAST`.
+#[allow(non_camel_case_types)]
+pub type PFN_vkCmdSetGaussianContributionBudgetGAURAST =
+    unsafe extern "system" fn(command_buffer: vk::CommandBuffer, contribution_budget: f32);
+
+/// The type of `vkCmdBindGaussianSphericalHarmonicsGAURAST`.
+#[allow(non_camel_case_types)]
+pub type PFN_vkCmdBindGaussianSphericalHarmonicsGAURAST = unsafe extern "system" fn(
+    command_buffer: vk::CommandBuffer,
+    p_buffer: *const GaussianSphericalHarmonicsBufferGAURAST<'_>,
 );

@@ -72,17 +72,21 @@ fn pipeline_state_chains_with_the_defaults_of_3dgs() {
     assert_eq!(found.transmittance_floor, 1e-4);
 }
 
-/// What the recording function below was called with: command buffer and the camera's eye.
-static CALLED: Mutex<Option<(u64, [f64; 3])>> = Mutex::new(None);
+/// What the recording function below was called with: command buffer and the eye of each camera.
+static CALLED: Mutex<Vec<(u64, [f64; 3])>> = Mutex::new(Vec::new());
 
-unsafe extern "system" fn record_camera(
+unsafe extern "system" fn record_cameras(
     command_buffer: vk::CommandBuffer,
-    p_camera: *const GaussianCameraGAURAST<'_>,
+    camera_count: u32,
+    p_cameras: *const GaussianCameraGAURAST<'_>,
 ) {
-    // SAFETY: the test passes a live camera.
-    let camera = unsafe { &*p_camera };
-    assert_eq!(camera.s_type, STRUCTURE_TYPE_GAUSSIAN_CAMERA_GAURAST);
-    *CALLED.lock().unwrap() = Some((command_buffer.as_raw(), camera.eye));
+    // SAFETY: the test passes live cameras.
+    let cameras = unsafe { std::slice::from_raw_parts(p_cameras, camera_count as usize) };
+    for camera in cameras {
+        assert_eq!(camera.s_type, STRUCTURE_TYPE_GAUSSIAN_CAMERA_GAURAST);
+        let call = (command_buffer.as_raw(), camera.eye);
+        CALLED.lock().unwrap().push(call);
+    }
 }
 
 unsafe extern "system" fn get_device_proc_addr(
@@ -90,13 +94,13 @@ unsafe extern "system" fn get_device_proc_addr(
     name: *const c_char,
 ) -> vk::PFN_vkVoidFunction {
     // SAFETY: ash passes a terminated string.
-    if unsafe { CStr::from_ptr(name) } != c"vkCmdSetGaussianCameraGAURAST" {
+    if unsafe { CStr::from_ptr(name) } != c"vkCmdSetGaussianCamerasGAURAST" {
         return None;
     }
-    let function: PFN_vkCmdSetGaussianCameraGAURAST = record_camera;
+    let function: PFN_vkCmdSetGaussianCamerasGAURAST = record_cameras;
     // SAFETY: one function pointer type to another; the caller casts it back.
     Some(unsafe {
-        std::mem::transmute::<PFN_vkCmdSetGaussianCameraGAURAST, unsafe extern "system" fn()>(
+        std::mem::transmute::<PFN_vkCmdSetGaussianCamerasGAURAST, unsafe extern "system" fn()>(
             function,
         )
     })
@@ -118,8 +122,9 @@ fn the_command_is_loaded_and_called() {
     let functions = gaussian_primitive_topology::Device::new(&instance, &device);
     assert_eq!(functions.device(), vk::Device::from_raw(2));
 
-    let camera = GaussianCameraGAURAST::default().eye([1.0, 2.0, 3.0]);
+    let eyes = [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]];
+    let cameras = eyes.map(|eye| GaussianCameraGAURAST::default().eye(eye));
     // SAFETY: the recording function accepts any handle.
-    unsafe { functions.cmd_set_gaussian_camera(vk::CommandBuffer::from_raw(3), &camera) };
-    assert_eq!(CALLED.lock().unwrap().take(), Some((3, [1.0, 2.0, 3.0])));
+    unsafe { functions.cmd_set_gaussian_cameras(vk::CommandBuffer::from_raw(3), &cameras) };
+    assert_eq!(*CALLED.lock().unwrap(), eyes.map(|eye| (3, eye)));
 }

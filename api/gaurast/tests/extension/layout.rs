@@ -17,7 +17,7 @@ macro_rules! assert_layout {
 
 #[gaurast_runner::test]
 fn features() {
-    assert_layout!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, 96, 8, {
+    assert_layout!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, 112, 8, {
         s_type: 0,
         p_next: 8,
         gaussian_primitive_topology: 16,
@@ -39,21 +39,23 @@ fn features() {
         gaussian_depth_stencil: 80,
         gaussian_multisample: 84,
         gaussian_approximation: 88,
+        gaussian_multiview: 92,
+        attribute_activation: 96,
+        spherical_harmonics_buffer: 100,
+        gaussian_dynamic_state: 104,
     });
 }
 
 #[gaurast_runner::test]
 fn properties() {
-    assert_layout!(PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_>, 56, 8, {
+    assert_layout!(PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_>, 48, 8, {
         s_type: 0,
         p_next: 8,
         tile_size: 16,
-        rasterizer_module_count: 24,
-        processing_element_count: 28,
-        max_spherical_harmonics_degree: 32,
-        gaussian_sample_counts: 36,
-        max_gaussians_per_draw: 40,
-        max_gaussians_per_set: 48,
+        max_spherical_harmonics_degree: 24,
+        gaussian_sample_counts: 28,
+        max_gaussians_per_draw: 32,
+        max_gaussians_per_set: 40,
     });
 }
 
@@ -78,7 +80,7 @@ fn pipeline_state() {
         accumulated_color: 0,
         depth: 4,
     });
-    assert_layout!(PipelineGaussianStateCreateInfoGAURAST<'_>, 128, 8, {
+    assert_layout!(PipelineGaussianStateCreateInfoGAURAST<'_>, 136, 8, {
         s_type: 0,
         p_next: 8,
         flags: 16,
@@ -99,6 +101,7 @@ fn pipeline_state() {
         camera_source: 116,
         camera_set: 120,
         camera_binding: 124,
+        camera_count: 128,
     });
     assert_layout!(PipelineGaussianApproximationStateCreateInfoGAURAST<'_>, 24, 8, {
         s_type: 0,
@@ -109,20 +112,33 @@ fn pipeline_state() {
 }
 
 #[gaurast_runner::test]
+fn spherical_harmonics_buffer() {
+    assert_layout!(GaussianSphericalHarmonicsBufferGAURAST<'_>, 48, 8, {
+        s_type: 0,
+        p_next: 8,
+        device_address: 16,
+        size: 24,
+        format: 32,
+        stride: 36,
+        coefficient_stride: 40,
+    });
+}
+
+#[gaurast_runner::test]
 fn camera() {
     assert_layout!(GaussianCameraGAURAST<'_>, 112, 8, {
         s_type: 0,
         p_next: 8,
-        model: 16,
-        rotation: 20,
-        eye: 56,
+        eye: 16,
+        model: 40,
+        rotation: 44,
         focal_length: 80,
         principal_point: 88,
-        near_plane: 96,
-        far_plane: 100,
-        depth_coefficients: 104,
+        depth_coefficients: 96,
+        near_plane: 104,
+        far_plane: 108,
     });
-    assert_layout!(GaussianCameraDataGAURAST, 112, 8, {
+    assert_layout!(GaussianCameraDataGAURAST, 128, 8, {
         eye: 0,
         model: 24,
         reserved: 28,
@@ -132,13 +148,14 @@ fn camera() {
         depth_coefficients: 96,
         near_plane: 104,
         far_plane: 108,
+        padding: 112,
     });
 }
 
 #[gaurast_runner::test]
 fn names_and_values() {
     assert_eq!(NAME.to_str(), Ok("VK_GAURAST_gaussian_primitive_topology"));
-    assert_eq!(SPEC_VERSION, 1);
+    assert_eq!(SPEC_VERSION, 2);
     let first = 1_000_000_000 + (EXTENSION_NUMBER as i32 - 1) * 1000;
     assert_eq!(first, 1_000_997_000);
     assert_eq!(PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST.as_raw(), first);
@@ -148,6 +165,7 @@ fn names_and_values() {
         STRUCTURE_TYPE_PIPELINE_GAUSSIAN_STATE_CREATE_INFO_GAURAST,
         STRUCTURE_TYPE_GAUSSIAN_CAMERA_GAURAST,
         STRUCTURE_TYPE_PIPELINE_GAUSSIAN_APPROXIMATION_STATE_CREATE_INFO_GAURAST,
+        STRUCTURE_TYPE_GAUSSIAN_SPHERICAL_HARMONICS_BUFFER_GAURAST,
     ];
     for (offset, structure_type) in structure_types.into_iter().enumerate() {
         assert_eq!(structure_type.as_raw(), first + offset as i32);
@@ -169,10 +187,6 @@ fn enum_values() {
     assert_eq!(GaussianCameraModelGAURAST::ORTHOGRAPHIC.as_raw(), 1);
     assert_eq!(GaussianCameraModelGAURAST::FISHEYE.as_raw(), 2);
     assert_eq!(GaussianCameraModelGAURAST::EQUIRECTANGULAR.as_raw(), 3);
-    assert_eq!(
-        PipelineGaussianStateCreateFlagsGAURAST::MERGE_DRAWS.as_raw(),
-        1
-    );
 }
 
 #[gaurast_runner::test]
@@ -182,6 +196,6 @@ fn debug_prints_names_and_unknown_numbers() {
         "PER_PIXEL"
     );
     assert_eq!(format!("{:?}", GaussianOrderGAURAST::from_raw(77)), "77");
-    let flags = PipelineGaussianStateCreateFlagsGAURAST::from_raw(0b101);
-    assert_eq!(format!("{flags:?}"), "MERGE_DRAWS | 100");
+    let flags = PipelineGaussianStateCreateFlagsGAURAST::from_raw(0b1001);
+    assert_eq!(format!("{flags:?}"), "LOG_SCALE | 1000");
 }

@@ -159,6 +159,34 @@ pub const LAYOUT: &[(&str, usize)] = &[
         ),
     ),
     (
+        "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, gaussianMultiview)",
+        offset_of!(
+            PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
+            gaussian_multiview
+        ),
+    ),
+    (
+        "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, attributeActivation)",
+        offset_of!(
+            PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
+            attribute_activation
+        ),
+    ),
+    (
+        "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, sphericalHarmonicsBuffer)",
+        offset_of!(
+            PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
+            spherical_harmonics_buffer
+        ),
+    ),
+    (
+        "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, gaussianDynamicState)",
+        offset_of!(
+            PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
+            gaussian_dynamic_state
+        ),
+    ),
+    (
         "sizeof(VkPhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST)",
         size_of::<PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_>>(),
     ),
@@ -181,20 +209,6 @@ pub const LAYOUT: &[(&str, usize)] = &[
         offset_of!(
             PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_>,
             tile_size
-        ),
-    ),
-    (
-        "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST, rasterizerModuleCount)",
-        offset_of!(
-            PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_>,
-            rasterizer_module_count
-        ),
-    ),
-    (
-        "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST, processingElementCount)",
-        offset_of!(
-            PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_>,
-            processing_element_count
         ),
     ),
     (
@@ -392,6 +406,10 @@ pub const LAYOUT: &[(&str, usize)] = &[
         offset_of!(PipelineGaussianStateCreateInfoGAURAST<'_>, camera_binding),
     ),
     (
+        "offsetof(VkPipelineGaussianStateCreateInfoGAURAST, cameraCount)",
+        offset_of!(PipelineGaussianStateCreateInfoGAURAST<'_>, camera_count),
+    ),
+    (
         "sizeof(VkPipelineGaussianApproximationStateCreateInfoGAURAST)",
         size_of::<PipelineGaussianApproximationStateCreateInfoGAURAST<'_>>(),
     ),
@@ -436,16 +454,16 @@ pub const LAYOUT: &[(&str, usize)] = &[
         offset_of!(GaussianCameraGAURAST<'_>, p_next),
     ),
     (
+        "offsetof(VkGaussianCameraGAURAST, eye)",
+        offset_of!(GaussianCameraGAURAST<'_>, eye),
+    ),
+    (
         "offsetof(VkGaussianCameraGAURAST, model)",
         offset_of!(GaussianCameraGAURAST<'_>, model),
     ),
     (
         "offsetof(VkGaussianCameraGAURAST, rotation)",
         offset_of!(GaussianCameraGAURAST<'_>, rotation),
-    ),
-    (
-        "offsetof(VkGaussianCameraGAURAST, eye)",
-        offset_of!(GaussianCameraGAURAST<'_>, eye),
     ),
     (
         "offsetof(VkGaussianCameraGAURAST, focalLength)",
@@ -456,6 +474,10 @@ pub const LAYOUT: &[(&str, usize)] = &[
         offset_of!(GaussianCameraGAURAST<'_>, principal_point),
     ),
     (
+        "offsetof(VkGaussianCameraGAURAST, depthCoefficients)",
+        offset_of!(GaussianCameraGAURAST<'_>, depth_coefficients),
+    ),
+    (
         "offsetof(VkGaussianCameraGAURAST, nearPlane)",
         offset_of!(GaussianCameraGAURAST<'_>, near_plane),
     ),
@@ -464,8 +486,39 @@ pub const LAYOUT: &[(&str, usize)] = &[
         offset_of!(GaussianCameraGAURAST<'_>, far_plane),
     ),
     (
-        "offsetof(VkGaussianCameraGAURAST, depthCoefficients)",
-        offset_of!(GaussianCameraGAURAST<'_>, depth_coefficients),
+        "sizeof(VkGaussianSphericalHarmonicsBufferGAURAST)",
+        size_of::<GaussianSphericalHarmonicsBufferGAURAST<'_>>(),
+    ),
+    (
+        "offsetof(VkGaussianSphericalHarmonicsBufferGAURAST, sType)",
+        offset_of!(GaussianSphericalHarmonicsBufferGAURAST<'_>, s_type),
+    ),
+    (
+        "offsetof(VkGaussianSphericalHarmonicsBufferGAURAST, pNext)",
+        offset_of!(GaussianSphericalHarmonicsBufferGAURAST<'_>, p_next),
+    ),
+    (
+        "offsetof(VkGaussianSphericalHarmonicsBufferGAURAST, deviceAddress)",
+        offset_of!(GaussianSphericalHarmonicsBufferGAURAST<'_>, device_address),
+    ),
+    (
+        "offsetof(VkGaussianSphericalHarmonicsBufferGAURAST, size)",
+        offset_of!(GaussianSphericalHarmonicsBufferGAURAST<'_>, size),
+    ),
+    (
+        "offsetof(VkGaussianSphericalHarmonicsBufferGAURAST, format)",
+        offset_of!(GaussianSphericalHarmonicsBufferGAURAST<'_>, format),
+    ),
+    (
+        "offsetof(VkGaussianSphericalHarmonicsBufferGAURAST, stride)",
+        offset_of!(GaussianSphericalHarmonicsBufferGAURAST<'_>, stride),
+    ),
+    (
+        "offsetof(VkGaussianSphericalHarmonicsBufferGAURAST, coefficientStride)",
+        offset_of!(
+            GaussianSphericalHarmonicsBufferGAURAST<'_>,
+            coefficient_stride
+        ),
     ),
     (
         "sizeof(VkGaussianCameraDataGAURAST)",
@@ -507,6 +560,10 @@ pub const LAYOUT: &[(&str, usize)] = &[
         "offsetof(VkGaussianCameraDataGAURAST, farPlane)",
         offset_of!(GaussianCameraDataGAURAST, far_plane),
     ),
+    (
+        "offsetof(VkGaussianCameraDataGAURAST, padding)",
+        offset_of!(GaussianCameraDataGAURAST, padding),
+    ),
 ];
 
 /// Values of enums, flags and constants.
@@ -539,6 +596,46 @@ pub const VALUES: &[(&str, i64)] = &[
     (
         "VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_APPROXIMATION_STATE_CREATE_INFO_GAURAST",
         STRUCTURE_TYPE_PIPELINE_GAUSSIAN_APPROXIMATION_STATE_CREATE_INFO_GAURAST.as_raw() as i64,
+    ),
+    (
+        "VK_STRUCTURE_TYPE_GAUSSIAN_SPHERICAL_HARMONICS_BUFFER_GAURAST",
+        STRUCTURE_TYPE_GAUSSIAN_SPHERICAL_HARMONICS_BUFFER_GAURAST.as_raw() as i64,
+    ),
+    (
+        "VK_DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST",
+        DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST.as_raw() as i64,
+    ),
+    (
+        "VK_DYNAMIC_STATE_GAUSSIAN_ANTIALIASING_GAURAST",
+        DYNAMIC_STATE_GAUSSIAN_ANTIALIASING_GAURAST.as_raw() as i64,
+    ),
+    (
+        "VK_DYNAMIC_STATE_GAUSSIAN_LOW_PASS_VARIANCE_GAURAST",
+        DYNAMIC_STATE_GAUSSIAN_LOW_PASS_VARIANCE_GAURAST.as_raw() as i64,
+    ),
+    (
+        "VK_DYNAMIC_STATE_GAUSSIAN_ALPHA_FLOOR_GAURAST",
+        DYNAMIC_STATE_GAUSSIAN_ALPHA_FLOOR_GAURAST.as_raw() as i64,
+    ),
+    (
+        "VK_DYNAMIC_STATE_GAUSSIAN_ALPHA_CEILING_GAURAST",
+        DYNAMIC_STATE_GAUSSIAN_ALPHA_CEILING_GAURAST.as_raw() as i64,
+    ),
+    (
+        "VK_DYNAMIC_STATE_GAUSSIAN_TRANSMITTANCE_FLOOR_GAURAST",
+        DYNAMIC_STATE_GAUSSIAN_TRANSMITTANCE_FLOOR_GAURAST.as_raw() as i64,
+    ),
+    (
+        "VK_DYNAMIC_STATE_GAUSSIAN_SPHERICAL_HARMONICS_DEGREE_GAURAST",
+        DYNAMIC_STATE_GAUSSIAN_SPHERICAL_HARMONICS_DEGREE_GAURAST.as_raw() as i64,
+    ),
+    (
+        "VK_DYNAMIC_STATE_GAUSSIAN_EXPONENTIAL_ERROR_GAURAST",
+        DYNAMIC_STATE_GAUSSIAN_EXPONENTIAL_ERROR_GAURAST.as_raw() as i64,
+    ),
+    (
+        "VK_DYNAMIC_STATE_GAUSSIAN_CONTRIBUTION_BUDGET_GAURAST",
+        DYNAMIC_STATE_GAUSSIAN_CONTRIBUTION_BUDGET_GAURAST.as_raw() as i64,
     ),
     (
         "VK_GAUSSIAN_PROJECTION_MODE_FIXED_FUNCTION_GAURAST",
@@ -621,7 +718,15 @@ pub const VALUES: &[(&str, i64)] = &[
         GaussianCameraModelGAURAST::EQUIRECTANGULAR.as_raw() as i64,
     ),
     (
-        "VK_PIPELINE_GAUSSIAN_STATE_CREATE_MERGE_DRAWS_BIT_GAURAST",
-        PipelineGaussianStateCreateFlagsGAURAST::MERGE_DRAWS.as_raw() as i64,
+        "VK_PIPELINE_GAUSSIAN_STATE_CREATE_LOG_SCALE_BIT_GAURAST",
+        PipelineGaussianStateCreateFlagsGAURAST::LOG_SCALE.as_raw() as i64,
+    ),
+    (
+        "VK_PIPELINE_GAUSSIAN_STATE_CREATE_LOGIT_OPACITY_BIT_GAURAST",
+        PipelineGaussianStateCreateFlagsGAURAST::LOGIT_OPACITY.as_raw() as i64,
+    ),
+    (
+        "VK_PIPELINE_GAUSSIAN_STATE_CREATE_SPHERICAL_HARMONICS_BUFFER_BIT_GAURAST",
+        PipelineGaussianStateCreateFlagsGAURAST::SPHERICAL_HARMONICS_BUFFER.as_raw() as i64,
     ),
 ];

@@ -86,6 +86,8 @@ pub(super) struct Member {
     pub(super) is_pointer: bool,
     /// The lengths of an array, the outermost first.
     pub(super) lengths: Vec<u32>,
+    /// The parameter that counts what a parameter points at, if it is an array.
+    pub(super) counted_by: Option<String>,
     pub(super) comment: String,
 }
 
@@ -301,7 +303,10 @@ fn command(command: vk_parse::Command) -> Option<Command> {
         parameters: definition
             .params
             .iter()
-            .map(|parameter| Member::declared(&parameter.definition.code))
+            .map(|parameter| Member {
+                counted_by: parameter.len.clone(),
+                ..Member::declared(&parameter.definition.code)
+            })
             .collect(),
         comment: definition.comment.unwrap_or_default(),
     })
@@ -324,6 +329,7 @@ impl Member {
                 .split(['[', ']'])
                 .filter_map(|length| length.parse().ok())
                 .collect(),
+            counted_by: None,
             comment: String::new(),
         }
     }

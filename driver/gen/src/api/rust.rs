@@ -391,7 +391,8 @@ fn field_name(command: &Command) -> String {
     format!("{}_{}", name.trim_start_matches('_'), TAG.to_lowercase())
 }
 
-/// Adds the method that calls a command's function: pointers to structures are references.
+/// Adds the method that calls a command's function: pointers to structures are references, and arrays with their counts
+/// are slices.
 fn add_command(calls: &mut String, comments: Comments<'_>, command: &Command) {
     let field = field_name(command);
     let tag = format!("_{}", TAG.to_lowercase());
@@ -399,7 +400,24 @@ fn add_command(calls: &mut String, comments: Comments<'_>, command: &Command) {
     for parameter in &command.parameters {
         let name = parameter.rust_name();
         let ty = rust_type(parameter);
-        let (name, ty) = match (name.strip_prefix("p_"), ty.strip_prefix("*const ")) {
+        let counts = |array: &&Member| array.counted_by.as_ref() == Some(&parameter.name);
+        if let Some(array) = command.parameters.iter().find(counts) {
+            let array = array.rust_name();
+            let _ = write!(
+                arguments,
+                "{}.len() as u32,",
+                array.trim_start_matches("p_")
+            );
+            continue;
+        }
+        let pointee = ty.strip_prefix("*const ");
+        if let (Some(_), Some(pointee)) = (&parameter.counted_by, pointee) {
+            let name = name.trim_start_matches("p_");
+            let _ = write!(parameters, "{name}: &[{pointee}],");
+            let _ = write!(arguments, "{name}.as_ptr(),");
+            continue;
+        }
+        let (name, ty) = match (name.strip_prefix("p_"), pointee) {
             (Some(name), Some(pointee)) => (name.to_owned(), format!("&{pointee}")),
             _ => (name, ty),
         };

@@ -21,8 +21,19 @@ pub(crate) enum DrawError {
     #[error("no graphics pipeline is bound")]
     Pipeline,
     /// No camera.
-    #[error("no camera is set: vkCmdSetGaussianCameraGAURAST must be recorded before the draw")]
+    #[error("no camera is set: vkCmdSetGaussianCamerasGAURAST must be recorded before the draw")]
     Camera,
+    /// No camera of a view.
+    #[error(
+        "there are {cameras} cameras, and view {view} would have number {view}: there must be one for all views, or more \
+         than the greatest view index (VUID-vkCmdDraw-cameraCount-GAURAST)"
+    )]
+    CameraOfView {
+        /// The view index.
+        view: u32,
+        /// Cameras.
+        cameras: usize,
+    },
     /// A camera of a model that is not enabled.
     #[error(
         "the camera's model is {0:?}, and its feature is not enabled (VUID-VkGaussianCameraGAURAST-model-parameter)"
@@ -47,6 +58,18 @@ pub(crate) enum DrawError {
     /// A uniform buffer that holds no camera.
     #[error("the camera's uniform buffer: {0}")]
     CameraData(String),
+    /// Another pipeline than that of the set's first draw.
+    #[error(
+        "its pipeline is not that of the first draw of the set that vkCmdBeginGaussianSetGAURAST has begun \
+         (VUID-vkCmdDraw-set-pipeline-GAURAST)"
+    )]
+    OtherPipelineInSet,
+    /// Other state than that of the set's first draw.
+    #[error(
+        "cameras, viewport, scissor or dynamic state are not those of the first draw of the set that \
+         vkCmdBeginGaussianSetGAURAST has begun (VUID-vkCmdDraw-set-state-GAURAST)"
+    )]
+    OtherStateInSet,
     /// No viewport.
     #[error("the pipeline's viewport is dynamic and none is set")]
     Viewport,
@@ -64,6 +87,17 @@ pub(crate) enum DrawError {
     /// Dynamic state that is not set.
     #[error("the pipeline's {0:?} is dynamic and was not set")]
     Dynamic(vk::DynamicState),
+    /// Dynamic state whose values a pipeline could not have.
+    #[error(
+        "a dynamic state was set to what the pipeline may not have: {0} (VUID-vkCmdDraw-dynamic-GAURAST)"
+    )]
+    DynamicValue(String),
+    /// No buffer of spherical harmonics.
+    #[error(
+        "no buffer of spherical harmonics is bound, which the pipeline's flags ask for \
+         (VUID-vkCmdDraw-sphericalHarmonicsBuffer-GAURAST)"
+    )]
+    Harmonics,
     /// No vertex buffer.
     #[error("no vertex buffer is bound at binding {0}")]
     VertexBuffer(u32),

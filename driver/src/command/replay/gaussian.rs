@@ -3,16 +3,17 @@
 use super::descriptors::{self, DescriptorSetNotBound};
 use super::draw::{DrawError, attribute_stream, indices};
 use super::state::State;
-use crate::command::{DrawParameters, camera};
+use crate::command::{DrawParameters, HarmonicsBuffer, camera};
 use crate::pipeline::GraphicsPipeline;
-use crate::pipeline::gaussian::stages::VertexProjection;
+use crate::pipeline::gaussian::stages::{ResolveStage, VertexProjection};
 use crate::pipeline::gaussian::{
-    CameraSource, GaussianAttributeSources, GaussianPipeline, GaussianSource,
+    CameraSource, GaussianAttributeSources, GaussianPipeline, GaussianSource, HarmonicsSource,
 };
 use crate::pipeline::state::AttributeSource;
 use simdevice::Packet;
 use simdevice::packet::{
-    GaussianAppend, GaussianAttributes, GaussianBegin, GaussianFragmentStage, ModelAttributes,
+    AttributeStream, BufferRange, GaussianAppend, GaussianAttributes, GaussianBegin,
+    GaussianFragmentStage, ModelAttributes,
 };
 use simdevice::program::bindings::Bindings;
 use simdevice::state::gaussian::{
@@ -21,33 +22,55 @@ use simdevice::state::gaussian::{
 use simdevice::state::{DrawState, Topology, Viewport};
 use std::sync::Arc;
 
-/// The packets that begin a sorted set.
+/// The beginning of a sorted set.
+pub(crate) struct Begin {
+    /// The state of the set.
+    pub(crate) set: GaussianBegin,
+    /// The program that makes colours, if there is one.
+    resolve: Option<GaussianFragmentStage>,
+}
+
+impl Begin {
+    /// The packets that begin the set.
+    pub(crate) fn packets(self) -> Vec<Packet> {
+        let mut packets = vec![Packet::GaussianBegin(Box::new(self.set))];
+        let resolve = self.resolve.map(Box::new);
+        packets.extend(resolve.map(Packet::GaussianFragmentStage));
+        packets
+    }
+}
+
+/// The beginning of a sorted set.
 ///
 /// # Errors
 /// [`DrawError`] where bound state that the set needs is missing.
-pub(crate) fn begin(state: &State, gaussian: &GaussianPipeline) -> Result<Vec<Packet>, DrawError> {
-    let mut packets = vec![Packet::GaussianBegin(Box::new(GaussianBegin {
-        state: fixed_state(state, gaussian)?,
-        camera: enabled_camera(state, gaussian)?,
-        viewport: upright(state.viewport(gaussian).ok_or(DrawError::Viewport)?),
-        scissor: state.scissor(gaussian).ok_or(DrawError::Scissor)?,
-    }))];
-    if let Some(stage) = &gaussian.resolve {
+pub(crate) fn begin(state: &State, gaussian: &GaussianPipeline) -> Result<Begin, DrawError> {
+    let [camera, further_cameras @ ..] = &*enabled_cameras(state, gaussian)? else {
+        return Err(DrawError::Camera);
+    };
+    let resolve = |stage: &ResolveStage| {
         let (sets, constants) = (&state.graphics_sets, &state.push_constants);
-        packets.push(Packet::GaussianFragmentStage(Box::new(
-            GaussianFragmentStage {
-                program: Arc::clone(&stage.program),
-                bindings: descriptors::bindings(&stage.resources, sets, constants)?,
-                sample_shading: stage.sample_shading,
-                alpha_to_coverage: stage.alpha_to_coverage,
-                alpha_to_one: stage.alpha_to_one,
-            },
-        )));
-    }
-    Ok(packets)
+        Ok::<_, DrawError>(GaussianFragmentStage {
+            program: Arc::clone(&stage.program),
+            bindings: descriptors::bindings(&stage.resources, sets, constants)?,
+            sample_shading: stage.sample_shading,
+            alpha_to_coverage: stage.alpha_to_coverage,
+            alpha_to_one: stage.alpha_to_one,
+        })
+    };
+    Ok(Begin {
+        set: GaussianBegin {
+            state: fixed_state(state, gaussian)?,
+            camera: *camera,
+            further_cameras: further_cameras.to_vec(),
+            viewport: upright(state.viewport(gaussian).ok_or(DrawError::Viewport)?),
+            scissor: state.scissor(gaussian).ok_or(DrawError::Scissor)?,
+        },
+        resolve: gaussian.resolve.as_ref().map(resolve).transpose()?,
+    })
 }
 
-/// The packet that adds a draw to a sorted set.
+/// The packet that adds a draw to a sorted set, whose beginning is `set`.
 ///
 /// # Errors
 /// [`DrawError`] where a buffer that the draw needs is not bound.
@@ -55,6 +78,7 @@ pub(crate) fn append(
     state: &State,
     pipeline: &GraphicsPipeline,
     gaussian: &GaussianPipeline,
+    set: &GaussianBegin,
     draw: &DrawParameters,
     draw_index: u32,
 ) -> Result<Packet, DrawError> {
@@ -65,7 +89,7 @@ pub(crate) fn append(
         }
     };
     Ok(Packet::GaussianAppend(Box::new(GaussianAppend {
-        attributes: attributes(state, pipeline, sources)?,
+        attributes: attributes(state, pipeline, sources, set.state.sh_degree)?,
         indices: indices(state, draw)?,
         first: draw.first,
         count: draw.count,
@@ -113,9 +137,26 @@ fn shaded(
     )))
 }
 
-/// The camera that a draw sees with, if its model's feature is enabled.
-fn enabled_camera(state: &State, gaussian: &GaussianPipeline) -> Result<Camera, DrawError> {
-    let camera = camera(state, gaussian.camera)?;
+/// The cameras that the views of a draw are seen with, in the order of views, if their models' features are enabled: one for
+/// all of them, or one for each.
+fn enabled_cameras(state: &State, gaussian: &GaussianPipeline) -> Result<Vec<Camera>, DrawError> {
+    let source = Cameras::new(state, gaussian.camera)?;
+    let views = (0..u32::BITS).filter(|view| gaussian.view_mask >> view & 1 == 1);
+    let cameras = match source.len() {
+        0 => return Err(DrawError::Camera),
+        count if count > 1 && gaussian.view_mask != 0 => views
+            .map(|view| source.get(view, count))
+            .collect::<Result<Vec<_>, _>>()?,
+        count => vec![source.get(0, count)?],
+    };
+    for camera in &cameras {
+        check_camera(camera, gaussian)?;
+    }
+    Ok(cameras)
+}
+
+/// Refuses a camera whose model is not enabled, or does not see Gaussians of the pipeline's modes.
+fn check_camera(camera: &Camera, gaussian: &GaussianPipeline) -> Result<(), DrawError> {
     if !gaussian.camera_models.have(camera.model) {
         return Err(DrawError::CameraModel(camera.model));
     }
@@ -128,27 +169,66 @@ fn enabled_camera(state: &State, gaussian: &GaussianPipeline) -> Result<Camera, 
                 && state.precision == GaussianPrecision::Float32
         }
     };
-    if !is_seen {
-        return Err(DrawError::ModeOfCameraModel(camera.model));
+    match is_seen {
+        true => Ok(()),
+        false => Err(DrawError::ModeOfCameraModel(camera.model)),
     }
-    Ok(camera)
 }
 
-/// The camera that a draw is given.
-fn camera(state: &State, source: CameraSource) -> Result<Camera, DrawError> {
-    let (set, binding) = match source {
-        CameraSource::None => return Ok(Camera::default()),
-        CameraSource::Command => return state.camera.ok_or(DrawError::Camera),
-        CameraSource::UniformBuffer { set, binding } => (set, binding),
-    };
-    let bound = state
-        .graphics_sets
-        .get(set)
-        .ok_or(DescriptorSetNotBound(set))?;
-    let range = bound
-        .buffer(binding)
-        .ok_or(DrawError::CameraBuffer { set, binding })?;
-    camera::read(&range).map_err(|error| DrawError::CameraData(error.to_string()))
+/// The cameras that a draw is given.
+enum Cameras<'a> {
+    /// One that means nothing.
+    None,
+    /// Those that a command has set.
+    Set(&'a [Camera]),
+    /// Those of a uniform buffer.
+    Buffer { range: BufferRange, count: usize },
+}
+
+impl<'a> Cameras<'a> {
+    fn new(state: &'a State, source: CameraSource) -> Result<Self, DrawError> {
+        let (set, binding, count) = match source {
+            CameraSource::None => return Ok(Self::None),
+            CameraSource::Command => return Ok(Self::Set(&state.cameras)),
+            CameraSource::UniformBuffer {
+                set,
+                binding,
+                count,
+            } => (set, binding, count),
+        };
+        let bound = state
+            .graphics_sets
+            .get(set)
+            .ok_or(DescriptorSetNotBound(set))?;
+        let range = bound
+            .buffer(binding)
+            .ok_or(DrawError::CameraBuffer { set, binding })?;
+        Ok(Self::Buffer {
+            range,
+            count: count as usize,
+        })
+    }
+
+    fn len(&self) -> usize {
+        match self {
+            Self::None => 1,
+            Self::Set(cameras) => cameras.len(),
+            Self::Buffer { count, .. } => *count,
+        }
+    }
+
+    /// The camera of a view, of `cameras` that there are.
+    fn get(&self, view: u32, cameras: usize) -> Result<Camera, DrawError> {
+        let none = DrawError::CameraOfView { view, cameras };
+        let number = view as usize;
+        match self {
+            Self::None => Ok(Camera::default()),
+            Self::Set(cameras) => cameras.get(number).copied().ok_or(none),
+            Self::Buffer { count, .. } if number >= *count => Err(none),
+            Self::Buffer { range, .. } => camera::read(range, number)
+                .map_err(|error| DrawError::CameraData(error.to_string())),
+        }
+    }
 }
 
 /// The state of the pipeline, with the dynamic part filled in.
@@ -164,12 +244,12 @@ fn fixed_state(
         .dynamic_states
         .apply(&gaussian.dynamic, &mut fixed)
         .map_err(DrawError::Dynamic)?;
-    let converted = fixed.draw_state();
-    Ok(Arc::new(GaussianState {
-        depth_stencil: converted.depth_stencil,
-        blend_constants: converted.blend_constants,
-        ..GaussianState::clone(&gaussian.state)
-    }))
+    let set = fixed.gaussian_state();
+    gaussian
+        .dynamic_rules
+        .check(&set)
+        .map_err(|error| DrawError::DynamicValue(error.to_string()))?;
+    Ok(Arc::new(set))
 }
 
 /// A Gaussian's pixels count from the upper left corner of the area that the viewport covers, so a negative
@@ -185,22 +265,54 @@ fn upright(viewport: Viewport) -> Viewport {
     }
 }
 
+/// The stream of a coefficient of a buffer of spherical harmonics.
+fn coefficient(buffer: &HarmonicsBuffer, number: u64) -> AttributeStream {
+    let range = &buffer.range;
+    let start = number.saturating_mul(buffer.coefficient_stride);
+    // Streams of one place are read together.
+    let (moved, offset) = match u32::try_from(start) {
+        Ok(offset) => (0, offset),
+        Err(_) => (start.min(range.size), 0),
+    };
+    AttributeStream {
+        buffer: BufferRange {
+            memory: Arc::clone(&range.memory),
+            offset: range.offset + moved,
+            size: range.size - moved,
+        },
+        stride: buffer.stride,
+        offset,
+        format: buffer.format,
+        instance_divisor: None,
+    }
+}
+
+/// The streams that fixed-function projection reads, with the harmonics of a degree.
 fn attributes(
     state: &State,
     pipeline: &GraphicsPipeline,
     sources: &GaussianAttributeSources,
+    degree: u32,
 ) -> Result<GaussianAttributes, DrawError> {
+    let count = (degree as usize + 1).pow(2);
     let stream = |source: &AttributeSource| attribute_stream(state, pipeline, source);
     Ok(GaussianAttributes {
         position: stream(&sources.position)?,
         scale: stream(&sources.scale)?,
         rotation: stream(&sources.rotation)?,
         opacity: stream(&sources.opacity)?,
-        spherical_harmonics: sources
-            .spherical_harmonics
-            .iter()
-            .map(stream)
-            .collect::<Result<_, _>>()?,
+        spherical_harmonics: match &sources.spherical_harmonics {
+            HarmonicsSource::Attributes(sources) => sources
+                .iter()
+                .take(count)
+                .map(stream)
+                .collect::<Result<_, _>>()?,
+            HarmonicsSource::Buffer => {
+                let bound = state.harmonics.as_ref().ok_or(DrawError::Harmonics)?;
+                (0..count as u64).map(|k| coefficient(bound, k)).collect()
+            }
+        },
+        activations: sources.activations,
         model: ModelAttributes {
             matrix: match &sources.model_matrix {
                 None => None,

@@ -6,8 +6,8 @@ mod gaussian;
 mod state;
 
 use self::draw::DrawError;
-use self::state::{State, bind};
-use super::{Command, DrawIndirect, DrawParameters, query};
+use self::state::{SharedSet, State, bind};
+use super::{Command, DrawIndirect, DrawParameters, HarmonicsBuffer, query};
 use crate::abi::error::Error;
 use crate::device_sync::{DeviceSync, WaitResult};
 use crate::instance::Instance;
@@ -15,6 +15,7 @@ use crate::pipeline::PipelineKind;
 use ash::vk;
 use simdevice::command_processor::ExecutionError;
 use simdevice::{CommandProcessor, Packet};
+use std::sync::Arc;
 
 /// The execution of commands on a queue's thread.
 pub(super) struct Execution<'a> {
@@ -70,39 +71,9 @@ impl Execution<'_> {
 /// [`Error::DeviceLost`] if the device is lost while it executes; what follows in the command buffer is then not executed.
 pub(super) fn replay(commands: &[Command], execution: &mut Execution<'_>) -> Result<(), Error> {
     let mut state = State::default();
-    for command in commands {
-        end_merged_draws_before(command, &mut state, execution)?;
-        execute(command, &mut state, execution)?;
-    }
-    end_merged_draws(&mut state, execution)
-}
-
-/// Ends the sorted set that draws are merged into, unless the command may come between them.
-fn end_merged_draws_before(
-    command: &Command,
-    state: &mut State,
-    execution: &mut Execution<'_>,
-) -> Result<(), Error> {
-    match command {
-        Command::Draw(_)
-        | Command::DrawIndirect(_)
-        | Command::BindVertexBuffers { .. }
-        | Command::BindIndexBuffer(_) => Ok(()),
-        // What a vertex shader is bound to may change from draw to draw.
-        Command::BindSets(_) | Command::PushDescriptors(_) | Command::PushConstants { .. }
-            if state.shades_gaussians() =>
-        {
-            Ok(())
-        }
-        _ => end_merged_draws(state, execution),
-    }
-}
-
-fn end_merged_draws(state: &mut State, execution: &mut Execution<'_>) -> Result<(), Error> {
-    if std::mem::take(&mut state.merged_draws_open) {
-        execution.execute(&Packet::GaussianEnd)?;
-    }
-    Ok(())
+    commands
+        .iter()
+        .try_for_each(|command| execute(command, &mut state, execution))
 }
 
 fn execute(
@@ -146,7 +117,16 @@ fn execute(
             state.dynamic_states.set(*dynamic_state);
             state.draw_state = None;
         }
-        Command::SetCamera(camera) => state.camera = Some(**camera),
+        Command::SetCameras(cameras) => state.cameras.clone_from(cameras),
+        Command::BindHarmonics(buffer) => state.harmonics = Some(HarmonicsBuffer::clone(buffer)),
+        Command::BeginGaussianSet => state.gaussian_set = Some(SharedSet::default()),
+        Command::EndGaussianSet => {
+            let set = state.gaussian_set.take();
+            // Nothing was begun where nothing was drawn.
+            if set.is_some_and(|set| set.first.is_some()) {
+                execution.execute(&Packet::GaussianEnd)?;
+            }
+        }
         Command::Draw(parameters) => draw(state, parameters, 0, execution)?,
         Command::DrawIndirect(indirect) => draw_indirect(state, indirect, execution)?,
         Command::BindComputePipeline(pipeline) => state.compute_pipeline = Some(pipeline.clone()),
@@ -218,17 +198,28 @@ fn packets(
     let pipeline = state.pipeline.clone().ok_or(DrawError::Pipeline)?;
     match &pipeline.kind {
         PipelineKind::Gaussian(gaussian) => {
-            let append = gaussian::append(state, &pipeline, gaussian, parameters, draw_index)?;
-            if state.merged_draws_open {
-                return Ok(vec![append]);
+            let begin = gaussian::begin(state, gaussian)?;
+            let append = gaussian::append(
+                state, &pipeline, gaussian, &begin.set, parameters, draw_index,
+            )?;
+            let Some(set) = &mut state.gaussian_set else {
+                let mut packets = begin.packets();
+                packets.extend([append, Packet::GaussianEnd]);
+                return Ok(packets);
+            };
+            match &set.first {
+                None => {
+                    set.first = Some((Arc::clone(&pipeline), Box::new(begin.set.clone())));
+                    let mut packets = begin.packets();
+                    packets.push(append);
+                    Ok(packets)
+                }
+                Some((first, _)) if !Arc::ptr_eq(first, &pipeline) => {
+                    Err(DrawError::OtherPipelineInSet)
+                }
+                Some((_, first)) if **first != begin.set => Err(DrawError::OtherStateInSet),
+                Some(_) => Ok(vec![append]),
             }
-            let mut packets = gaussian::begin(state, gaussian)?;
-            state.merged_draws_open = gaussian.merges_draws;
-            packets.push(append);
-            if !gaussian.merges_draws {
-                packets.push(Packet::GaussianEnd);
-            }
-            Ok(packets)
         }
         PipelineKind::Primitive(primitives) => {
             draw::primitives(state, &pipeline, primitives, parameters, draw_index)

@@ -1,13 +1,14 @@
 //! The state that a command buffer's draws read, as the commands replayed so far have left it.
 
 use crate::abi::error::Error;
-use crate::command::{BindPoint, BoundSet, IndexBuffer, VertexBuffer};
+use crate::command::{BindPoint, BoundSet, HarmonicsBuffer, IndexBuffer, VertexBuffer};
 use crate::descriptor::layout::DescriptorSetLayout;
 use crate::descriptor::set::{DescriptorSet, Write};
+use crate::pipeline::GraphicsPipeline;
 use crate::pipeline::compute::ComputePipeline;
 use crate::pipeline::dynamic_state::DynamicStates;
-use crate::pipeline::gaussian::{GaussianPipeline, GaussianSource};
-use crate::pipeline::{GraphicsPipeline, PipelineKind};
+use crate::pipeline::gaussian::GaussianPipeline;
+use simdevice::packet::GaussianBegin;
 use simdevice::state::gaussian::Camera;
 use simdevice::state::{DrawState, Rect, Viewport};
 use std::sync::Arc;
@@ -41,10 +42,20 @@ pub(crate) struct State {
     pub(crate) dynamic_states: DynamicStates,
     /// The fixed-function state that the last draw made of all this, unless something has changed since.
     pub(crate) draw_state: Option<Arc<DrawState>>,
-    /// The camera of Gaussian draws; kept when another pipeline is bound.
-    pub(crate) camera: Option<Camera>,
-    /// True if draws are being merged into a sorted set that has begun.
-    pub(crate) merged_draws_open: bool,
+    /// The cameras of Gaussian draws, one for all views or one for each, if they were set; kept when another pipeline is
+    /// bound.
+    pub(crate) cameras: Box<[Camera]>,
+    /// The buffer of spherical harmonics.
+    pub(crate) harmonics: Option<HarmonicsBuffer>,
+    /// The sorted set that draws share, if one was begun.
+    pub(crate) gaussian_set: Option<SharedSet>,
+}
+
+/// A sorted set that draws share.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct SharedSet {
+    /// The pipeline and the state of its first draw; `None` before that.
+    pub(crate) first: Option<(Arc<GraphicsPipeline>, Box<GaussianBegin>)>,
 }
 
 impl State {
@@ -60,13 +71,6 @@ impl State {
         pipeline
             .scissor
             .or_else(|| self.scissors.first().copied().flatten())
-    }
-
-    /// Tells if the pipeline's Gaussians are projected by a vertex shader.
-    pub(crate) fn shades_gaussians(&self) -> bool {
-        let primitive = self.pipeline.as_ref().map(|pipeline| &pipeline.kind);
-        matches!(primitive, Some(PipelineKind::Gaussian(gaussian))
-            if matches!(gaussian.source, GaussianSource::VertexShader(_)))
     }
 
     /// The descriptor sets of a bind point.

@@ -2,10 +2,11 @@
 
 pub(crate) mod stages;
 mod valid_usage;
+pub(crate) mod values;
 
 use self::stages::{ResolveStage, VertexProjection};
 use self::valid_usage::*;
-use super::dynamic_state::is_taken_by_gaussians;
+use super::dynamic_state::{GaussianStates, is_taken_by_gaussians};
 use super::state::{AttributeSource, FixedFunctionState, GraphicsState, attribute};
 use crate::abi::error::Error;
 use crate::convert;
@@ -14,14 +15,14 @@ use crate::device::Device;
 use crate::registry::features::Features;
 use ash::vk;
 use gaurast::vk::{
-    GAUSSIAN_LOCATION_UNUSED_GAURAST, GaussianAntialiasingGAURAST, GaussianCameraSourceGAURAST,
-    GaussianGeometryGAURAST, GaussianLinearizationGAURAST, GaussianOrderGAURAST,
-    GaussianPrecisionGAURAST, PipelineGaussianStateCreateFlagsGAURAST,
-    PipelineGaussianStateCreateInfoGAURAST,
+    GAUSSIAN_LOCATION_UNUSED_GAURAST, GaussianCameraSourceGAURAST, GaussianGeometryGAURAST,
+    GaussianLinearizationGAURAST, GaussianPrecisionGAURAST,
+    PipelineGaussianStateCreateFlagsGAURAST as Flags, PipelineGaussianStateCreateInfoGAURAST,
 };
+use simdevice::packet::Activations;
 use simdevice::state::gaussian::{
-    CameraModel, GaussianApproximation, GaussianGeometry, GaussianLinearization, GaussianOrder,
-    GaussianPrecision, GaussianState,
+    CameraModel, GaussianApproximation, GaussianGeometry, GaussianLinearization, GaussianPrecision,
+    GaussianState,
 };
 use simdevice::state::{DrawState, Rect, Viewport};
 use std::sync::Arc;
@@ -35,16 +36,18 @@ pub(crate) struct GaussianPipeline {
     pub(crate) fixed: FixedFunctionState,
     /// The states that the command buffer sets of that.
     pub(crate) dynamic: Vec<vk::DynamicState>,
+    /// What their values are held against.
+    pub(crate) dynamic_rules: DynamicRules,
     /// The viewport, unless it is dynamic.
     pub(crate) viewport: Option<Viewport>,
     /// The scissor, unless it is dynamic.
     pub(crate) scissor: Option<Rect>,
-    /// The source of draws' camera.
+    /// The source of draws' cameras.
     pub(crate) camera: CameraSource,
+    /// The views of the passes that it draws in, a bit each; none if they have none.
+    pub(crate) view_mask: u32,
     /// The models that the camera may have.
     pub(crate) camera_models: CameraModels,
-    /// True if consecutive draws are sorted together.
-    pub(crate) merges_draws: bool,
     /// The source of Gaussians.
     pub(crate) source: GaussianSource,
     /// The stage that makes colours of what they accumulate.
@@ -72,19 +75,30 @@ pub(crate) struct GaussianAttributeSources {
     /// The source of opacities.
     pub(crate) opacity: AttributeSource,
     /// The sources of the spherical harmonics' coefficients.
-    pub(crate) spherical_harmonics: Vec<AttributeSource>,
+    pub(crate) spherical_harmonics: HarmonicsSource,
+    /// The functions that are applied to scales and opacities.
+    pub(crate) activations: Activations,
     /// The sources of the rows of model matrices, if there are any.
     pub(crate) model_matrix: Option<[AttributeSource; 3]>,
     /// The source of factors of the opacity, if there are any.
     pub(crate) model_opacity: Option<AttributeSource>,
 }
 
-/// The source of Gaussian draws' camera.
+/// The source of spherical harmonics.
+#[derive(Debug)]
+pub(crate) enum HarmonicsSource {
+    /// Vertex attributes, one for each coefficient.
+    Attributes(Vec<AttributeSource>),
+    /// `vkCmdBindGaussianSphericalHarmonicsGAURAST`.
+    Buffer,
+}
+
+/// The source of Gaussian draws' cameras.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum CameraSource {
     /// There is none: a vertex shader projects.
     None,
-    /// `vkCmdSetGaussianCameraGAURAST`.
+    /// `vkCmdSetGaussianCamerasGAURAST`.
     Command,
     /// A uniform buffer, read when the draw executes.
     UniformBuffer {
@@ -92,6 +106,8 @@ pub(crate) enum CameraSource {
         set: u32,
         /// The binding, whose first descriptor it is.
         binding: u32,
+        /// Cameras in the buffer.
+        count: u32,
     },
 }
 
@@ -139,28 +155,36 @@ impl GaussianPipeline {
                 ),
             ));
         };
-        if info.fragment_output.view_mask != 0 {
-            return Err(Error::FeatureNotPresent(
-                "Gaussians in a pass with views".into(),
-            ));
+        let view_mask = info.fragment_output.view_mask;
+        if view_mask != 0 {
+            require(features, MULTIVIEW, "the view mask is not 0")?;
         }
-        combinations(info, gaussian)?;
+        let gaussian = &without_dynamic(info, gaussian);
+        let allowed = Modes::new(info, gaussian);
+        allowed.check()?;
         stages(info, gaussian, features)?;
         modes(gaussian, features)?;
-        values(gaussian)?;
-        let approximation = approximation(info, features)?;
+        numbers(gaussian)?;
+        let approximation = approximation(info)?;
         fixed_state(info, features)?;
-        let fragments = FixedFunctionState::of_gaussians(info)?;
-
+        let mut fragments = FixedFunctionState::of_gaussians(info)?;
         let taken = info.dynamic.iter().copied();
-        let taken = taken.filter(|&state| is_taken_by_gaussians(state));
+        let taken = taken.filter(|&state| {
+            // What a vertex shader projects has no harmonics.
+            let is_ignored = vk::DynamicState::GAUSSIAN_SPHERICAL_HARMONICS_DEGREE == state;
+            is_taken_by_gaussians(state) && !(is_shaded(gaussian) && is_ignored)
+        });
+        let state = GaussianState {
+            approximation,
+            ..state(gaussian, fragments.draw_state())?
+        };
+        require_modes(features, &state)?;
+        fragments.gaussian = Some(Box::new(state.clone()));
         Ok(Self {
             source: source(device, info, gaussian)?,
             resolve: ResolveStage::new(device, info, gaussian, &fragments)?,
-            state: Arc::new(GaussianState {
-                approximation,
-                ..state(gaussian, features, fragments.draw_state())?
-            }),
+            dynamic_rules: DynamicRules::new(allowed, features, state.sh_degree),
+            state: Arc::new(state),
             dynamic: taken.collect(),
             fixed: fragments,
             viewport: fixed(
@@ -178,10 +202,8 @@ impl GaussianPipeline {
             )?
             .map(convert::rect),
             camera: camera_source(info, gaussian, features)?,
+            view_mask,
             camera_models: CameraModels::of(features),
-            merges_draws: gaussian
-                .flags
-                .contains(PipelineGaussianStateCreateFlagsGAURAST::MERGE_DRAWS),
         })
     }
 }
@@ -207,7 +229,12 @@ fn source(
     }
     let degree = gaussian.spherical_harmonics_degree;
     let coefficients = (degree + 1) * (degree + 1);
-    distinct_locations(locations, coefficients)?;
+    let in_buffer = gaussian.flags.contains(Flags::SPHERICAL_HARMONICS_BUFFER);
+    if in_buffer {
+        let what = "flags has SPHERICAL_HARMONICS_BUFFER";
+        require(device.features(), HARMONICS_BUFFER, what)?;
+    }
+    distinct_locations(locations, if in_buffer { 0 } else { coefficients })?;
     let first = locations.first_spherical_harmonics;
     let scales = match gaussian.geometry {
         GaussianGeometryGAURAST::GAUSSIAN_2D => 2,
@@ -218,12 +245,19 @@ fn source(
         scale: attribute(info, "scale", locations.scale, scales)?,
         rotation: attribute(info, "rotation", locations.rotation, 4)?,
         opacity: attribute(info, "opacity", locations.opacity, 1)?,
-        spherical_harmonics: (0..coefficients)
-            .map(|k| {
+        spherical_harmonics: if in_buffer {
+            HarmonicsSource::Buffer
+        } else {
+            let all = (0..coefficients).map(|k| {
                 let name = format!("spherical harmonics coefficient {k}");
                 attribute(info, &name, first.saturating_add(k), 3)
-            })
-            .collect::<Result<_, _>>()?,
+            });
+            HarmonicsSource::Attributes(all.collect::<Result<_, _>>()?)
+        },
+        activations: Activations {
+            log_scale: gaussian.flags.contains(Flags::LOG_SCALE),
+            logit_opacity: gaussian.flags.contains(Flags::LOGIT_OPACITY),
+        },
         model_matrix: match locations.first_model_matrix {
             GAUSSIAN_LOCATION_UNUSED_GAURAST => None,
             first => {
@@ -252,37 +286,11 @@ fn fixed<T: Copy>(name: &str, dynamic: bool, values: &[T]) -> Result<Option<T>, 
 
 fn state(
     gaussian: &PipelineGaussianStateCreateInfoGAURAST,
-    features: &Features,
     fragments: DrawState,
 ) -> Result<GaussianState, Error> {
-    let opacity_compensated = match gaussian.antialiasing {
-        GaussianAntialiasingGAURAST::DILATE => false,
-        GaussianAntialiasingGAURAST::OPACITY_COMPENSATED => {
-            require(
-                features,
-                OPACITY_COMPENSATION,
-                "antialiasing is OPACITY_COMPENSATED",
-            )?;
-            true
-        }
-        other => return Err(unknown("antialiasing", &other)),
-    };
-    let order = match gaussian.order {
-        GaussianOrderGAURAST::VIEW_DEPTH => GaussianOrder::ViewDepth,
-        GaussianOrderGAURAST::RADIAL_DISTANCE => {
-            require(features, RADIAL_DISTANCE_ORDER, "order is RADIAL_DISTANCE")?;
-            GaussianOrder::RadialDistance
-        }
-        GaussianOrderGAURAST::PRIMITIVE => {
-            require(features, PRIMITIVE_ORDER, "order is PRIMITIVE")?;
-            GaussianOrder::Primitive
-        }
-        GaussianOrderGAURAST::PER_PIXEL => {
-            require(features, PER_PIXEL_ORDER, "order is PER_PIXEL")?;
-            GaussianOrder::PerPixel
-        }
-        other => return Err(unknown("order", &other)),
-    };
+    let opacity_compensated = values::is_compensated(gaussian.antialiasing)
+        .ok_or_else(|| unknown("antialiasing", &gaussian.antialiasing))?;
+    let order = values::order(gaussian.order).ok_or_else(|| unknown("order", &gaussian.order))?;
     Ok(GaussianState {
         precision: match gaussian.precision {
             GaussianPrecisionGAURAST::FLOAT16 => GaussianPrecision::Float16,
@@ -354,7 +362,23 @@ fn camera_source(
             ),
         ));
     }
-    Ok(CameraSource::UniformBuffer { set, binding })
+    let count = gaussian.camera_count;
+    let views = u32::BITS - info.fragment_output.view_mask.leading_zeros();
+    if count == 0 || count > 1 && count < views {
+        return Err(Error::usage(
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-cameraCount-views",
+            format!(
+                "{STRUCTURE}: cameraCount is {count}, but must be 1, for all views, or greater than the greatest view \
+                 index of view mask {:#b}",
+                info.fragment_output.view_mask
+            ),
+        ));
+    }
+    Ok(CameraSource::UniformBuffer {
+        set,
+        binding,
+        count,
+    })
 }
 
 /// Tells if a binding is a uniform buffer that the vertex stage sees.

@@ -11,9 +11,7 @@ use crate::pipeline::state::{
 };
 use crate::shader_module::ShaderStage;
 use ash::vk;
-use gaurast::vk::{
-    GAUSSIAN_LOCATION_UNUSED_GAURAST, GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST,
-};
+use gaurast::vk::{GAUSSIAN_LOCATION_UNUSED_GAURAST, PipelineGaussianStateCreateInfoGAURAST};
 use gaurast_spirv::{BuiltIn, InputSource, Interface, OutputTarget, ScalarType, Stage};
 use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Rate, Type};
@@ -51,7 +49,6 @@ impl VertexProjection {
                 "projectionMode is VERTEX_SHADER, and there is no vertex stage",
             )
         })?;
-        check_order(state)?;
         // Nothing of a vertex stage depends on samples.
         let vertex = stages::translate(device, layout(info)?, stage, Stage::Vertex, 1)?;
         let components = components(state, &vertex.interface)?;
@@ -68,23 +65,6 @@ impl VertexProjection {
             resources,
         })
     }
-}
-
-/// Refuses orders that a vertex shader's outputs do not tell.
-fn check_order(state: &PipelineGaussianStateCreateInfoGAURAST) -> Result<(), Error> {
-    let has_key = state.vertex_output_locations.depth_key != GAUSSIAN_LOCATION_UNUSED_GAURAST;
-    let (vuid, what) = match state.order {
-        GaussianOrderGAURAST::RADIAL_DISTANCE if !has_key => (
-            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-depthKey-order",
-            "order is RADIAL_DISTANCE, but depthKey is unused",
-        ),
-        GaussianOrderGAURAST::PER_PIXEL => (
-            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-projectionMode-order",
-            "order is PER_PIXEL, but projectionMode is VERTEX_SHADER",
-        ),
-        _ => return Ok(()),
-    };
-    Err(Error::usage(vuid, what))
 }
 
 /// A resolve shader.
@@ -128,7 +108,7 @@ impl ResolveStage {
             color: &color,
             second_source: info.fragment_output.blend.iter().any(reads_second_source),
             points: false,
-            views: false,
+            views: info.fragment_output.view_mask != 0,
         };
         let programs = link::link_resolve(fragment, &varyings, live_outputs)?;
         let program = GaussianFragmentProgram::new(device.simulated().level(), &programs)

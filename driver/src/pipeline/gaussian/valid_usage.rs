@@ -1,8 +1,9 @@
 //! The rules of a Gaussian pipeline's state, each with its id, and the features that its modes need.
 
+use super::values;
 use crate::abi::error::Error;
 use crate::physical_device::limits::MAX_SPHERICAL_HARMONICS_DEGREE;
-use crate::pipeline::dynamic_state::may_gaussians_have;
+use crate::pipeline::dynamic_state::{GaussianStates, is_of_gaussians, may_gaussians_have};
 use crate::pipeline::state::{GraphicsState, reads_second_source};
 use crate::registry::features::Features;
 use ash::vk;
@@ -10,9 +11,9 @@ use gaurast::vk::{
     GAUSSIAN_LOCATION_UNUSED_GAURAST, GaussianAntialiasingGAURAST,
     GaussianAttributeLocationsGAURAST, GaussianGeometryGAURAST, GaussianLinearizationGAURAST,
     GaussianOrderGAURAST, GaussianPrecisionGAURAST, GaussianProjectionModeGAURAST,
-    PipelineGaussianStateCreateFlagsGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+    PipelineGaussianStateCreateFlagsGAURAST as Flags, PipelineGaussianStateCreateInfoGAURAST,
 };
-use simdevice::state::gaussian::GaussianApproximation;
+use simdevice::state::gaussian::{GaussianApproximation, GaussianOrder, GaussianState};
 use std::ops::Range;
 
 pub(super) const STRUCTURE: &str = "VkPipelineGaussianStateCreateInfoGAURAST";
@@ -75,11 +76,6 @@ pub(super) const UNIFORM_BUFFER_CAMERA: Feature = (
     "uniformBufferCamera",
     "VUID-VkPipelineGaussianStateCreateInfoGAURAST-uniformBufferCamera-feature",
 );
-pub(super) const MERGED_DRAWS: Feature = (
-    |features| features.merged_draws,
-    "mergedDraws",
-    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-mergedDraws-feature",
-);
 pub(super) const INSTANCING: Feature = (
     |features| features.gaussian_instancing,
     "gaussianInstancing",
@@ -99,6 +95,28 @@ pub(super) const APPROXIMATION: Feature = (
     |features| features.gaussian_approximation,
     "gaussianApproximation",
     "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianApproximation-feature",
+);
+
+pub(super) const MULTIVIEW: Feature = (
+    |features| features.gaussian_multiview,
+    "gaussianMultiview",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianMultiview-feature",
+);
+
+pub(super) const HARMONICS_BUFFER: Feature = (
+    |features| features.spherical_harmonics_buffer,
+    "sphericalHarmonicsBuffer",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-sphericalHarmonicsBuffer-feature",
+);
+pub(super) const ATTRIBUTE_ACTIVATION: Feature = (
+    |features| features.attribute_activation,
+    "attributeActivation",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-attributeActivation-feature",
+);
+pub(super) const DYNAMIC_STATE: Feature = (
+    |features| features.gaussian_dynamic_state,
+    "gaussianDynamicState",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianDynamicState-feature",
 );
 
 /// Refuses `what` unless its feature is enabled, which one that the device lacks never is.
@@ -133,54 +151,202 @@ pub(super) fn is_shaded(gaussian: &PipelineGaussianStateCreateInfoGAURAST) -> bo
     gaussian.projection_mode == GaussianProjectionModeGAURAST::VERTEX_SHADER
 }
 
-/// Refuses modes that mean nothing together.
-pub(super) fn combinations(
-    info: &GraphicsState,
-    gaussian: &PipelineGaussianStateCreateInfoGAURAST,
-) -> Result<(), Error> {
-    let broken =
-        |id: &'static str, what: &str| Err(Error::usage(id, format!("{STRUCTURE}: {what}")));
-    let shaded = is_shaded(gaussian);
-    let per_pixel = gaussian.order == GaussianOrderGAURAST::PER_PIXEL;
-    let flat = gaussian.geometry == GaussianGeometryGAURAST::GAUSSIAN_2D;
-    let half = gaussian.precision == GaussianPrecisionGAURAST::FLOAT16;
-    let placed =
-        gaussian.attribute_locations.first_model_matrix != GAUSSIAN_LOCATION_UNUSED_GAURAST;
-    if !shaded && placed && (per_pixel || flat) {
-        return broken(
-            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-firstModelMatrix-modes",
-            "firstModelMatrix is used, but order is PER_PIXEL or geometry is GAUSSIAN_2D",
-        );
+/// The modes of a pipeline that do not all go together.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Modes {
+    order: GaussianOrder,
+    is_compensated: bool,
+    is_shaded: bool,
+    is_flat: bool,
+    is_half: bool,
+    is_linearized: bool,
+    /// There are model matrices.
+    is_placed: bool,
+    /// The vertex shader writes what is sorted by.
+    has_key: bool,
+    /// The fragment stage reads depths.
+    reads_depth: bool,
+}
+
+impl Modes {
+    pub(super) fn new(
+        info: &GraphicsState,
+        gaussian: &PipelineGaussianStateCreateInfoGAURAST,
+    ) -> Self {
+        let is_used = |location: u32| location != GAUSSIAN_LOCATION_UNUSED_GAURAST;
+        Self {
+            // What is no value is refused where it is converted.
+            order: values::order(gaussian.order).unwrap_or(GaussianOrder::ViewDepth),
+            is_compensated: values::is_compensated(gaussian.antialiasing).unwrap_or(false),
+            is_shaded: is_shaded(gaussian),
+            is_flat: gaussian.geometry == GaussianGeometryGAURAST::GAUSSIAN_2D,
+            is_half: gaussian.precision == GaussianPrecisionGAURAST::FLOAT16,
+            is_linearized: gaussian.linearization != GaussianLinearizationGAURAST::JACOBIAN,
+            is_placed: is_used(gaussian.attribute_locations.first_model_matrix),
+            has_key: is_used(gaussian.vertex_output_locations.depth_key),
+            reads_depth: has_fragment_stage(info)
+                && is_used(gaussian.resolve_input_locations.depth),
+        }
     }
-    if !shaded && flat && gaussian.linearization != GaussianLinearizationGAURAST::JACOBIAN {
-        return broken(
-            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-geometry-linearization",
-            "linearization is not JACOBIAN, but geometry is GAUSSIAN_2D, which is not linearized",
-        );
+
+    /// Refuses modes that mean nothing together.
+    pub(super) fn check(&self) -> Result<(), Error> {
+        let per_pixel = self.order == GaussianOrder::PerPixel;
+        let by_distance = self.order == GaussianOrder::RadialDistance;
+        let (shaded, flat, half) = (self.is_shaded, self.is_flat, self.is_half);
+        let rules = [
+            (
+                !shaded && self.is_placed && (per_pixel || flat),
+                "VUID-VkPipelineGaussianStateCreateInfoGAURAST-firstModelMatrix-modes",
+                "firstModelMatrix is used, but order is PER_PIXEL or geometry is GAUSSIAN_2D",
+            ),
+            (
+                !shaded && flat && self.is_linearized,
+                "VUID-VkPipelineGaussianStateCreateInfoGAURAST-geometry-linearization",
+                "linearization is not JACOBIAN, but geometry is GAUSSIAN_2D, which is not linearized",
+            ),
+            (
+                flat && self.is_compensated,
+                "VUID-VkPipelineGaussianStateCreateInfoGAURAST-geometry-antialiasing",
+                "antialiasing is OPACITY_COMPENSATED, but geometry is GAUSSIAN_2D, which is not dilated",
+            ),
+            (
+                half && (flat || per_pixel || shaded),
+                "VUID-VkPipelineGaussianStateCreateInfoGAURAST-precision-modes",
+                "precision is FLOAT16, but geometry is GAUSSIAN_2D, order is PER_PIXEL or projectionMode is \
+                 VERTEX_SHADER, which are for FLOAT32",
+            ),
+            (
+                shaded && by_distance && !self.has_key,
+                "VUID-VkPipelineGaussianStateCreateInfoGAURAST-depthKey-order",
+                "order is RADIAL_DISTANCE, but depthKey is unused",
+            ),
+            (
+                shaded && per_pixel,
+                "VUID-VkPipelineGaussianStateCreateInfoGAURAST-projectionMode-order",
+                "order is PER_PIXEL, but projectionMode is VERTEX_SHADER",
+            ),
+            (
+                self.reads_depth && (half || per_pixel),
+                "VUID-VkGaussianResolveInputLocationsGAURAST-depth-modes",
+                "a fragment stage has depths for an input, but precision is FLOAT16 or order is PER_PIXEL, which \
+                 accumulate none",
+            ),
+        ];
+        match rules.iter().find(|(is_broken, ..)| *is_broken) {
+            None => Ok(()),
+            Some((_, id, what)) => Err(Error::usage(*id, format!("{STRUCTURE}: {what}"))),
+        }
     }
-    if flat && gaussian.antialiasing == GaussianAntialiasingGAURAST::OPACITY_COMPENSATED {
-        return broken(
-            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-geometry-antialiasing",
-            "antialiasing is OPACITY_COMPENSATED, but geometry is GAUSSIAN_2D, which is not dilated",
-        );
+}
+
+/// What the values of dynamic states are held against when a draw executes.
+#[derive(Debug)]
+pub(crate) struct DynamicRules {
+    modes: Modes,
+    features: Box<Features>,
+    /// The degree whose coefficients are there.
+    max_degree: u32,
+}
+
+impl DynamicRules {
+    pub(super) fn new(modes: Modes, features: &Features, max_degree: u32) -> Self {
+        Self {
+            modes,
+            features: Box::new(features.clone()),
+            max_degree,
+        }
     }
-    if half && (flat || per_pixel || shaded) {
-        return broken(
-            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-precision-modes",
-            "precision is FLOAT16, but geometry is GAUSSIAN_2D, order is PER_PIXEL or projectionMode is \
-             VERTEX_SHADER, which are for FLOAT32",
-        );
+
+    /// Refuses a state with dynamic values that a pipeline could not have.
+    ///
+    /// # Errors
+    /// An [`Error`] that names the valid usage broken, or the feature that is not enabled.
+    pub(crate) fn check(&self, state: &GaussianState) -> Result<(), Error> {
+        let modes = Modes {
+            order: state.order,
+            is_compensated: state.opacity_compensated,
+            ..self.modes
+        };
+        modes.check()?;
+        require_modes(&self.features, state)?;
+        ceiling_over_floor(state.alpha_floor, state.alpha_ceiling)?;
+        if state.sh_degree > self.max_degree {
+            return Err(Error::usage(
+                "VUID-vkCmdDraw-sphericalHarmonicsDegree-GAURAST",
+                format!(
+                    "sphericalHarmonicsDegree was set to {}, but the pipeline has coefficients of degree {}",
+                    state.sh_degree, self.max_degree
+                ),
+            ));
+        }
+        Ok(())
     }
-    let reads_depth = has_fragment_stage(info)
-        && gaussian.resolve_input_locations.depth != GAUSSIAN_LOCATION_UNUSED_GAURAST;
-    if reads_depth && (half || per_pixel) {
-        return broken(
-            "VUID-VkGaussianResolveInputLocationsGAURAST-depth-modes",
-            "a fragment stage has depths for an input, but precision is FLOAT16 or order is PER_PIXEL, which \
-             accumulate none",
-        );
+}
+
+/// Refuses the modes that may be dynamic unless their features are enabled.
+pub(super) fn require_modes(features: &Features, state: &GaussianState) -> Result<(), Error> {
+    if state.opacity_compensated {
+        let what = "antialiasing is OPACITY_COMPENSATED";
+        require(features, OPACITY_COMPENSATION, what)?;
+    }
+    match state.order {
+        GaussianOrder::ViewDepth => {}
+        GaussianOrder::RadialDistance => {
+            require(features, RADIAL_DISTANCE_ORDER, "order is RADIAL_DISTANCE")?;
+        }
+        GaussianOrder::Primitive => require(features, PRIMITIVE_ORDER, "order is PRIMITIVE")?,
+        GaussianOrder::PerPixel => require(features, PER_PIXEL_ORDER, "order is PER_PIXEL")?,
+    }
+    if state.approximation != GaussianApproximation::default() {
+        let what = "exponentialError or contributionBudget is not 0";
+        require(features, APPROXIMATION, what)?;
     }
     Ok(())
+}
+
+fn ceiling_over_floor(floor: f32, ceiling: f32) -> Result<(), Error> {
+    if ceiling >= floor {
+        return Ok(());
+    }
+    Err(Error::usage(
+        "VUID-VkPipelineGaussianStateCreateInfoGAURAST-alphaCeiling-value",
+        format!("alphaCeiling is {ceiling}, but must be at least alphaFloor, which is {floor}"),
+    ))
+}
+
+/// A create info whose members that dynamic states stand in for are such that no rule is broken by them.
+pub(super) fn without_dynamic<'a>(
+    info: &GraphicsState,
+    gaussian: &PipelineGaussianStateCreateInfoGAURAST<'a>,
+) -> PipelineGaussianStateCreateInfoGAURAST<'a> {
+    use vk::DynamicState as S;
+    let mut own = *gaussian;
+    if info.is_dynamic(S::GAUSSIAN_ORDER) {
+        own.order = GaussianOrderGAURAST::VIEW_DEPTH;
+    }
+    if info.is_dynamic(S::GAUSSIAN_ANTIALIASING) {
+        own.antialiasing = GaussianAntialiasingGAURAST::DILATE;
+    }
+    for (state, member, value) in [
+        (
+            S::GAUSSIAN_LOW_PASS_VARIANCE,
+            &mut own.low_pass_variance,
+            0.0,
+        ),
+        (S::GAUSSIAN_ALPHA_FLOOR, &mut own.alpha_floor, 0.0),
+        (S::GAUSSIAN_ALPHA_CEILING, &mut own.alpha_ceiling, 1.0),
+        (
+            S::GAUSSIAN_TRANSMITTANCE_FLOOR,
+            &mut own.transmittance_floor,
+            0.0,
+        ),
+    ] {
+        if info.is_dynamic(state) {
+            *member = value;
+        }
+    }
+    own
 }
 
 pub(super) fn stages(
@@ -272,12 +438,13 @@ pub(super) fn modes(
         }
         other => return Err(unknown("precision", &other)),
     }
-    let merge_draws = PipelineGaussianStateCreateFlagsGAURAST::MERGE_DRAWS;
-    if gaussian.flags.contains(merge_draws) {
-        require(features, MERGED_DRAWS, "flags has MERGE_DRAWS")?;
-    }
-    if !merge_draws.contains(gaussian.flags) {
+    let activations = Flags::LOG_SCALE | Flags::LOGIT_OPACITY;
+    if !(activations | Flags::SPHERICAL_HARMONICS_BUFFER).contains(gaussian.flags) {
         return Err(unknown("flags", &gaussian.flags));
+    }
+    if gaussian.flags.intersects(activations) && !is_shaded(gaussian) {
+        let what = "flags has LOG_SCALE or LOGIT_OPACITY";
+        require(features, ATTRIBUTE_ACTIVATION, what)?;
     }
     Ok(())
 }
@@ -302,7 +469,7 @@ pub(super) fn distinct_locations(
     ];
     let mut used: Vec<(&str, Range<u32>)> = Vec::new();
     for (name, first, count) in members {
-        if first == GAUSSIAN_LOCATION_UNUSED_GAURAST {
+        if first == GAUSSIAN_LOCATION_UNUSED_GAURAST || count == 0 {
             continue;
         }
         let own = first..first.saturating_add(count);
@@ -322,69 +489,35 @@ pub(super) fn distinct_locations(
     Ok(())
 }
 
-pub(super) fn values(gaussian: &PipelineGaussianStateCreateInfoGAURAST) -> Result<(), Error> {
-    let check = |valid: bool, (name, vuid), value: &dyn std::fmt::Display, rule: &str| {
-        if valid {
-            return Ok(());
-        }
-        let message: String = format!("{STRUCTURE}: {name} is {value}, but must be {rule}");
-        Err(Error::usage(vuid, message))
-    };
-    // Comparisons are false for NaN, which is therefore refused.
+/// Refuses numbers out of their ranges.
+pub(super) fn numbers(gaussian: &PipelineGaussianStateCreateInfoGAURAST) -> Result<(), Error> {
     let g = gaussian;
-    check(
-        is_shaded(g) || g.spherical_harmonics_degree <= MAX_SPHERICAL_HARMONICS_DEGREE,
-        (
-            "sphericalHarmonicsDegree",
+    let degree = g.spherical_harmonics_degree;
+    if !is_shaded(g) && degree > MAX_SPHERICAL_HARMONICS_DEGREE {
+        return Err(Error::usage(
             "VUID-VkPipelineGaussianStateCreateInfoGAURAST-sphericalHarmonicsDegree-value",
-        ),
-        &g.spherical_harmonics_degree,
-        "at most maxSphericalHarmonicsDegree (4)",
+            format!(
+                "{STRUCTURE}: sphericalHarmonicsDegree is {degree}, but must be at most \
+                 maxSphericalHarmonicsDegree ({MAX_SPHERICAL_HARMONICS_DEGREE})"
+            ),
+        ));
+    }
+    values::LOW_PASS_VARIANCE.check(
+        g.low_pass_variance,
+        "VUID-VkPipelineGaussianStateCreateInfoGAURAST-lowPassVariance-value",
     )?;
-    check(
-        g.low_pass_variance >= 0.0 && g.low_pass_variance.is_finite(),
-        (
-            "lowPassVariance",
-            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-lowPassVariance-value",
-        ),
-        &g.low_pass_variance,
-        "finite and not negative",
+    values::ALPHA_FLOOR.check(
+        g.alpha_floor,
+        "VUID-VkPipelineGaussianStateCreateInfoGAURAST-alphaFloor-value",
     )?;
-    check(
-        (0.0..=1.0).contains(&g.alpha_floor),
-        (
-            "alphaFloor",
-            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-alphaFloor-value",
-        ),
-        &g.alpha_floor,
-        "at least 0 and at most 1",
+    values::ALPHA_CEILING.check(
+        g.alpha_ceiling,
+        "VUID-VkPipelineGaussianStateCreateInfoGAURAST-alphaCeiling-value",
     )?;
-    check(
-        g.alpha_ceiling > 0.0 && g.alpha_ceiling <= 1.0,
-        (
-            "alphaCeiling",
-            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-alphaCeiling-value",
-        ),
-        &g.alpha_ceiling,
-        "greater than 0 and at most 1",
-    )?;
-    check(
-        g.alpha_ceiling >= g.alpha_floor,
-        (
-            "alphaCeiling",
-            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-alphaCeiling-value",
-        ),
-        &g.alpha_ceiling,
-        "at least alphaFloor",
-    )?;
-    check(
-        g.transmittance_floor >= 0.0 && g.transmittance_floor < 1.0,
-        (
-            "transmittanceFloor",
-            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-transmittanceFloor-value",
-        ),
-        &g.transmittance_floor,
-        "at least 0 and less than 1",
+    ceiling_over_floor(g.alpha_floor, g.alpha_ceiling)?;
+    values::TRANSMITTANCE_FLOOR.check(
+        g.transmittance_floor,
+        "VUID-VkPipelineGaussianStateCreateInfoGAURAST-transmittanceFloor-value",
     )
 }
 
@@ -429,6 +562,10 @@ pub(super) fn fixed_state(info: &GraphicsState, features: &Features) -> Result<(
             "rasterizerDiscardEnable with Gaussians".into(),
         ));
     }
+    if info.dynamic.iter().copied().any(is_of_gaussians) {
+        let what = "a dynamic state of Gaussians is used";
+        require(features, DYNAMIC_STATE, what)?;
+    }
     let shades = has_fragment_stage(info);
     if let Some(state) = info
         .dynamic
@@ -454,42 +591,22 @@ pub(super) fn fixed_state(info: &GraphicsState, features: &Features) -> Result<(
     Ok(())
 }
 
-/// Validates and converts the chain's structure of approximations, if it has one.
-pub(super) fn approximation(
-    info: &GraphicsState,
-    features: &Features,
-) -> Result<GaussianApproximation, Error> {
-    let Some(given) = &info.approximation else {
-        return Ok(GaussianApproximation::default());
-    };
-    check_fraction(
-        "exponentialError",
-        "VUID-VkPipelineGaussianApproximationStateCreateInfoGAURAST-exponentialError-value",
-        given.exponential_error,
-    )?;
-    check_fraction(
-        "contributionBudget",
-        "VUID-VkPipelineGaussianApproximationStateCreateInfoGAURAST-contributionBudget-value",
-        given.contribution_budget,
-    )?;
-    let approximation = GaussianApproximation {
-        exponential_error: given.exponential_error,
-        contribution_budget: given.contribution_budget,
-    };
-    if approximation != GaussianApproximation::default() {
-        let what = "exponentialError or contributionBudget is not 0";
-        require(features, APPROXIMATION, what)?;
+/// Validates and converts the chain's structure of approximations, if it has one, as far as it is not dynamic.
+pub(super) fn approximation(info: &GraphicsState) -> Result<GaussianApproximation, Error> {
+    use vk::DynamicState as S;
+    let given = info.approximation.unwrap_or_default();
+    let mut own = GaussianApproximation::default();
+    if !info.is_dynamic(S::GAUSSIAN_EXPONENTIAL_ERROR) {
+        let vuid =
+            "VUID-VkPipelineGaussianApproximationStateCreateInfoGAURAST-exponentialError-value";
+        values::EXPONENTIAL_ERROR.check(given.exponential_error, vuid)?;
+        own.exponential_error = given.exponential_error;
     }
-    Ok(approximation)
-}
-
-fn check_fraction(name: &str, vuid: &'static str, value: f32) -> Result<(), Error> {
-    // A NaN is in no range.
-    if (0.0..=1.0).contains(&value) {
-        return Ok(());
+    if !info.is_dynamic(S::GAUSSIAN_CONTRIBUTION_BUDGET) {
+        let vuid =
+            "VUID-VkPipelineGaussianApproximationStateCreateInfoGAURAST-contributionBudget-value";
+        values::CONTRIBUTION_BUDGET.check(given.contribution_budget, vuid)?;
+        own.contribution_budget = given.contribution_budget;
     }
-    let message = format!(
-        "VkPipelineGaussianApproximationStateCreateInfoGAURAST: {name} is {value}, but must be at least 0 and at most 1"
-    );
-    Err(Error::usage(vuid, message))
+    Ok(own)
 }

@@ -46,6 +46,7 @@ fn append() -> GaussianAppend {
             opacity: stream(),
             spherical_harmonics: vec![stream()],
             model: ModelAttributes::default(),
+            activations: Default::default(),
         },
         indices: None,
         first: 0,

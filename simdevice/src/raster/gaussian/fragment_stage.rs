@@ -110,7 +110,7 @@ impl<'a> FragmentStageDraw<'a> {
     ) -> Result<(), Stopped> {
         for (index, output) in self.colors.iter().enumerate() {
             if let (Some(_), Some(target)) = (output, &self.targets.color[index]) {
-                tools.buffers.color[index].load_or_clear(target, 0, tile);
+                tools.buffers.color[index].load_or_clear(target, self.draw.layer, tile);
             }
         }
         let groups: Vec<SampleGroup> = (0..self.samples)
@@ -277,8 +277,8 @@ impl<'a> FragmentStageDraw<'a> {
                 }
                 FragmentInput::PointCoord(_)
                 | FragmentInput::PrimitiveId
-                | FragmentInput::Layer
                 | FragmentInput::ViewportIndex => [0; BLOCK_PIXELS],
+                FragmentInput::Layer => [self.draw.layer; BLOCK_PIXELS],
             };
             // An input that is the same for all lanes has one chunk.
             if let Some(chunk) = machine.input_mut(slot).get_mut(number) {

@@ -93,7 +93,12 @@ impl<'a> GaussianTileDraw<'a> {
         }
     }
 
-    /// Renders what it covers of a tile.
+    /// The layer that it is drawn to.
+    pub fn layer(&self) -> u32 {
+        self.draw.layer
+    }
+
+    /// Renders what it covers of a tile of its layer.
     ///
     /// # Errors
     /// [`Stopped`] if its resolve shader ran for too long, or `cancel` was set.
@@ -109,14 +114,14 @@ impl<'a> GaussianTileDraw<'a> {
             return Ok(());
         }
         if let Some(target) = self.targets.depth.filter(|_| self.tests.reads_depth()) {
-            buffers.depth.load_or_clear(target, 0, tile);
+            buffers.depth.load_or_clear(target, self.draw.layer, tile);
         }
         if let Some(target) = self
             .targets
             .stencil
             .filter(|_| self.tests.stencil.is_some())
         {
-            buffers.stencil.load_or_clear(target, 0, tile);
+            buffers.stencil.load_or_clear(target, self.draw.layer, tile);
         }
         let mut samples = self.test_first(tile, buffers);
         let reads_depth = self
@@ -287,7 +292,7 @@ impl<'a> GaussianTileDraw<'a> {
         else {
             return;
         };
-        plane.load_or_clear(target, 0, tile);
+        plane.load_or_clear(target, self.draw.layer, tile);
         for (sample, lanes) in covered.iter().enumerate().take(self.samples) {
             let start = plane.start(tile.index, sample);
             let accumulators = &samples.accumulators[sample];

@@ -112,6 +112,7 @@ fn draw_with_depth(
             rotation: stream(24, Format::R32G32B32A32Sfloat),
             opacity: stream(40, Format::R32Sfloat),
             model: ModelAttributes::default(),
+            activations: Default::default(),
             spherical_harmonics: vec![stream(44, Format::R32G32B32Sfloat)],
         },
         indices: None,
@@ -122,6 +123,7 @@ fn draw_with_depth(
     };
     let begin = GaussianBegin {
         state: Arc::new(state),
+        further_cameras: Vec::new(),
         camera: Camera {
             model: CameraModel::Pinhole,
             rotation: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],

@@ -6,6 +6,7 @@
 //!
 //! | step | what | where |
 //! |---|---|---|
+//! | before | attributes of logarithms and logits | [`activation`] |
 //! | 1, 2 | what is skipped, and under which reason | [`project`] |
 //! | 3, 4 | mean, covariance, determinant, opacity compensation | [`project`] |
 //! | 1 to 5 | of what a vertex shader has projected | [`shaded`] |
@@ -46,6 +47,7 @@
 //! - the clamps (ceiling of alpha, `u` and `v`, colour) are continuous: either side gives the same
 //!   value to within the error itself.
 
+pub mod activation;
 mod binary16;
 pub mod error_model;
 mod instance;

@@ -217,7 +217,7 @@ impl Run {
         // SAFETY: see above.
         unsafe {
             self.gaussian
-                .cmd_set_gaussian_camera(self.commands, &camera);
+                .cmd_set_gaussian_cameras(self.commands, &[camera]);
             self.device
                 .cmd_set_viewport(self.commands, bytes.number(1), &[viewport]);
             self.device.cmd_set_scissor(self.commands, 0, &[scissor]);

@@ -1,0 +1,58 @@
+//! Sorted sets that several draws share.
+
+use super::Command;
+use super::buffer::{CommandBuffer, Recorder};
+use crate::abi::error::Error;
+
+#[doc(alias = "vkCmdBeginGaussianSetGAURAST")]
+pub(crate) fn cmd_begin_gaussian_set(command_buffer: &CommandBuffer) -> Result<(), Error> {
+    let is_enabled = command_buffer.device().features().merged_draws;
+    command_buffer.record("vkCmdBeginGaussianSetGAURAST", |recorder| {
+        if !is_enabled {
+            return Err(Error::FeatureNotEnabled {
+                vuid: "VUID-vkCmdBeginGaussianSetGAURAST-mergedDraws-feature",
+                message: "a set of draws is begun, but the feature mergedDraws is not enabled"
+                    .into(),
+            });
+        }
+        recorder.require_pass()?;
+        if recorder.has_gaussian_set {
+            return Err(Error::usage(
+                "VUID-vkCmdBeginGaussianSetGAURAST-set-begun",
+                "the set that was begun before has not ended",
+            ));
+        }
+        recorder.has_gaussian_set = true;
+        recorder.push(Command::BeginGaussianSet);
+        Ok(())
+    })
+}
+
+#[doc(alias = "vkCmdEndGaussianSetGAURAST")]
+pub(crate) fn cmd_end_gaussian_set(recorder: &mut Recorder) -> Result<(), Error> {
+    if !std::mem::take(&mut recorder.has_gaussian_set) {
+        return Err(Error::usage(
+            "VUID-vkCmdEndGaussianSetGAURAST-set-begun",
+            "no set was begun in this command buffer, or it has ended",
+        ));
+    }
+    recorder.push(Command::EndGaussianSet);
+    Ok(())
+}
+
+impl Recorder {
+    /// Fails within a set of draws.
+    ///
+    /// # Errors
+    /// [`Error::InvalidUsage`].
+    pub(super) fn require_no_gaussian_set(&self) -> Result<(), Error> {
+        match self.has_gaussian_set {
+            false => Ok(()),
+            true => Err(Error::usage(
+                "VUID-vkCmdBeginGaussianSetGAURAST-set-end",
+                "a set of draws that vkCmdBeginGaussianSetGAURAST has begun must end by vkCmdEndGaussianSetGAURAST \
+                 before its subpass, its dynamic rendering or the command buffer ends, or secondaries are executed",
+            )),
+        }
+    }
+}

@@ -1,0 +1,285 @@
+//! Vertex streams, pipelines and pictures with layers, on a device that has all features.
+//!
+//! `unsafe` has the reason that it has in `gaurast_tests::triangles`.
+
+use crate::triangles::devices::own;
+use ash::vk;
+use gaurast::gaussian_primitive_topology;
+use gaurast::vk::{
+    GaussianAttributeLocationsGAURAST, PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST,
+    PipelineGaussianApproximationStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+};
+use gaurast_tests::scenes::SceneBuffers;
+use gaurast_tests::triangles::shader::{Stage, compile};
+use gaurast_tests::triangles::{Bindings, Buffer, Commands, Gpu, Image, ImageOptions};
+
+pub type State = PipelineGaussianStateCreateInfoGAURAST<'static>;
+
+/// The width and height of all pictures.
+pub const SIZE: [u32; 2] = [131, 97];
+
+/// A vertex buffer and the attributes in it.
+pub struct Stream {
+    buffer: Buffer,
+    stride: u32,
+    rate: vk::VertexInputRate,
+    /// Locations, formats and offsets.
+    attributes: Vec<(u32, vk::Format, u32)>,
+}
+
+impl Stream {
+    /// A buffer of one attribute by vertex, whose elements follow one another.
+    pub fn new<T: bytemuck::Pod>(location: u32, format: vk::Format, elements: &[T]) -> Self {
+        Self {
+            buffer: Buffer::of(own(), elements),
+            stride: size_of::<T>() as u32,
+            rate: vk::VertexInputRate::VERTEX,
+            attributes: vec![(location, format, 0)],
+        }
+    }
+
+    /// The rows of a matrix and a number by instance, at four locations.
+    pub fn of_instances(location: u32, instances: &[[f32; 13]]) -> Self {
+        let four = vk::Format::R32G32B32A32_SFLOAT;
+        Self {
+            rate: vk::VertexInputRate::INSTANCE,
+            attributes: vec![
+                (location, four, 0),
+                (location + 1, four, 16),
+                (location + 2, four, 32),
+                (location + 3, vk::Format::R32_SFLOAT, 48),
+            ],
+            ..Self::new(location, four, instances)
+        }
+    }
+
+    /// The attributes of a scene: position, scale, rotation, opacity, harmonics, from location 0 on.
+    pub fn of(scene: &SceneBuffers) -> Vec<Self> {
+        let triple = vk::Format::R32G32B32_SFLOAT;
+        let count = (scene.degree + 1).pow(2);
+        vec![
+            Self::new(0, triple, &scene.positions),
+            Self::new(1, triple, &scene.scales),
+            Self::new(2, vk::Format::R32G32B32A32_SFLOAT, &scene.rotations),
+            Self::new(3, vk::Format::R32_SFLOAT, &scene.opacities),
+            Self {
+                buffer: Buffer::of(own(), &scene.sh),
+                stride: 12 * count,
+                rate: vk::VertexInputRate::VERTEX,
+                attributes: (0..count).map(|k| (4 + k, triple, 12 * k)).collect(),
+            },
+        ]
+    }
+}
+
+/// The locations of [`Stream::of`].
+pub fn locations() -> GaussianAttributeLocationsGAURAST {
+    GaussianAttributeLocationsGAURAST::default()
+        .position(0)
+        .scale(1)
+        .rotation(2)
+        .opacity(3)
+        .first_spherical_harmonics(4)
+}
+
+/// What a [`Pipeline`] is made of.
+#[derive(Clone)]
+pub struct Options<'a> {
+    pub state: State,
+    pub approximation: Option<PipelineGaussianApproximationStateCreateInfoGAURAST<'static>>,
+    pub view_mask: u32,
+    /// Dynamic states beside viewport and scissor.
+    pub dynamic: Vec<vk::DynamicState>,
+    pub bindings: Option<&'a Bindings>,
+    /// A resolve shader in GLSL.
+    pub fragment: Option<&'a str>,
+}
+
+impl Options<'_> {
+    /// Draws scenes of a degree.
+    pub fn new(state: State, degree: u32) -> Self {
+        Self {
+            state: state
+                .spherical_harmonics_degree(degree)
+                .attribute_locations(locations()),
+            approximation: None,
+            view_mask: 0,
+            dynamic: Vec::new(),
+            bindings: None,
+            fragment: None,
+        }
+    }
+}
+
+/// A pipeline that replaces what a target of 32-bit floats holds.
+pub struct Pipeline {
+    raw: vk::Pipeline,
+    layout: vk::PipelineLayout,
+}
+
+impl Pipeline {
+    pub fn new(streams: &[Stream], options: &Options<'_>) -> Self {
+        let (gpu, device) = (own(), own().device());
+        let numbered = || (0..).zip(streams);
+        let bindings: Vec<_> = numbered()
+            .map(|(binding, stream)| vk::VertexInputBindingDescription {
+                binding,
+                stride: stream.stride,
+                input_rate: stream.rate,
+            })
+            .collect();
+        let attributes: Vec<_> = numbered()
+            .flat_map(|(binding, stream)| {
+                let all = stream.attributes.iter();
+                all.map(
+                    move |&(location, format, offset)| vk::VertexInputAttributeDescription {
+                        location,
+                        binding,
+                        format,
+                        offset,
+                    },
+                )
+            })
+            .collect();
+        let vertex_input = vk::PipelineVertexInputStateCreateInfo::default()
+            .vertex_binding_descriptions(&bindings)
+            .vertex_attribute_descriptions(&attributes);
+        let assembly = vk::PipelineInputAssemblyStateCreateInfo::default()
+            .topology(PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST);
+        let viewport = vk::PipelineViewportStateCreateInfo::default()
+            .viewport_count(1)
+            .scissor_count(1);
+        let raster = vk::PipelineRasterizationStateCreateInfo::default().line_width(1.0);
+        let multisample = vk::PipelineMultisampleStateCreateInfo::default()
+            .rasterization_samples(vk::SampleCountFlags::TYPE_1);
+        let writes = [vk::PipelineColorBlendAttachmentState::default()
+            .color_write_mask(vk::ColorComponentFlags::RGBA)];
+        let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&writes);
+        let mut dynamic = vec![vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
+        dynamic.extend(&options.dynamic);
+        let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic);
+        let mut rendering = vk::PipelineRenderingCreateInfo::default()
+            .view_mask(options.view_mask)
+            .color_attachment_formats(&[vk::Format::R32G32B32A32_SFLOAT]);
+        let mut state = options.state;
+        let mut approximation = options.approximation.unwrap_or_default();
+        let words = options.fragment.map(|text| compile(Stage::Fragment, text));
+        let sets: Vec<_> = options.bindings.iter().map(|all| all.layout).collect();
+        let layout_info = vk::PipelineLayoutCreateInfo::default().set_layouts(&sets);
+        let info = vk::GraphicsPipelineCreateInfo::default()
+            .vertex_input_state(&vertex_input)
+            .input_assembly_state(&assembly)
+            .viewport_state(&viewport)
+            .rasterization_state(&raster)
+            .multisample_state(&multisample)
+            .color_blend_state(&blend)
+            .dynamic_state(&dynamic)
+            .push_next(&mut rendering)
+            .push_next(&mut state)
+            .push_next(&mut approximation);
+        // SAFETY: see the module.
+        unsafe {
+            let module = words.map(|words| {
+                let info = vk::ShaderModuleCreateInfo::default().code(&words);
+                gpu.device()
+                    .create_shader_module(&info, None)
+                    .expect("a module")
+            });
+            let stages: Vec<_> = module
+                .iter()
+                .map(|&module| {
+                    vk::PipelineShaderStageCreateInfo::default()
+                        .stage(vk::ShaderStageFlags::FRAGMENT)
+                        .module(module)
+                        .name(c"main")
+                })
+                .collect();
+            let layout = device
+                .create_pipeline_layout(&layout_info, None)
+                .expect("a layout");
+            let infos = [info.layout(layout).stages(&stages)];
+            let pipelines = device
+                .create_graphics_pipelines(vk::PipelineCache::null(), &infos, None)
+                .expect("a pipeline");
+            if let Some(module) = module {
+                device.destroy_shader_module(module, None);
+            }
+            Self {
+                raw: pipelines[0],
+                layout,
+            }
+        }
+    }
+
+    /// Binds it and its vertex buffers, and its descriptors.
+    pub fn bind(&self, commands: &Commands, streams: &[Stream], bindings: Option<&Bindings>) {
+        let (device, point) = (commands.device(), vk::PipelineBindPoint::GRAPHICS);
+        for (binding, stream) in (0..).zip(streams) {
+            commands.vertex_buffer(binding, &stream.buffer, 0);
+        }
+        // SAFETY: see the module.
+        unsafe {
+            device.cmd_bind_pipeline(commands.raw, point, self.raw);
+            if let Some(bindings) = bindings {
+                let sets = [bindings.set];
+                device.cmd_bind_descriptor_sets(commands.raw, point, self.layout, 0, &sets, &[]);
+            }
+        }
+    }
+}
+
+impl Drop for Pipeline {
+    fn drop(&mut self) {
+        // SAFETY: see the module.
+        unsafe {
+            own().device().destroy_pipeline(self.raw, None);
+            own().device().destroy_pipeline_layout(self.layout, None);
+        }
+    }
+}
+
+/// The extension's functions.
+pub fn extension() -> &'static gaussian_primitive_topology::Device {
+    own().gaussian().expect("a device that draws Gaussians")
+}
+
+/// The pictures of a pass over `layers` layers, of which `view_mask` are views, that are transparent at its beginning.
+pub fn pictures(layers: u32, view_mask: u32, draw: impl FnOnce(&Commands)) -> Vec<Vec<[f32; 4]>> {
+    let gpu: &Gpu = own();
+    let format = vk::Format::R32G32B32A32_SFLOAT;
+    let image = Image::new(
+        gpu,
+        &ImageOptions {
+            layers,
+            view: vk::ImageViewType::TYPE_2D_ARRAY,
+            ..ImageOptions::new(format, SIZE, vk::ImageUsageFlags::COLOR_ATTACHMENT)
+        },
+    );
+    let attachments = [vk::RenderingAttachmentInfo::default()
+        .image_view(image.view)
+        .image_layout(vk::ImageLayout::GENERAL)
+        .load_op(vk::AttachmentLoadOp::CLEAR)
+        .store_op(vk::AttachmentStoreOp::STORE)];
+    let [width, height] = SIZE;
+    let area = vk::Rect2D::default().extent(vk::Extent2D { width, height });
+    let info = vk::RenderingInfo::default()
+        .render_area(area)
+        .layer_count(1)
+        .view_mask(view_mask)
+        .color_attachments(&attachments);
+    gpu.run(|commands| {
+        commands.barrier();
+        // SAFETY: see the module.
+        unsafe { gpu.device().cmd_begin_rendering(commands.raw, &info) };
+        commands.viewport([0.0, 0.0, width as f32, height as f32], [0.0, 1.0]);
+        commands.scissor([0, 0], SIZE);
+        draw(commands);
+        // SAFETY: see the module.
+        unsafe { gpu.device().cmd_end_rendering(commands.raw) };
+        commands.barrier();
+    });
+    let bytes = image.read(vk::ImageAspectFlags::COLOR, 16);
+    let texels: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&bytes);
+    let layer = (width * height) as usize;
+    texels.chunks_exact(layer).map(<[_]>::to_vec).collect()
+}
