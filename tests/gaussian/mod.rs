@@ -13,6 +13,7 @@ mod popping;
 mod rasterization_modes;
 mod recorded_work;
 mod reference;
+mod second;
 mod shaded;
 mod what_ifs;
 
