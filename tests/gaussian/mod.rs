@@ -3,6 +3,7 @@
 mod accuracy;
 mod approximations;
 mod cameras;
+mod conformance_cases;
 mod depth_stencil;
 mod determinism;
 mod given_scenes;

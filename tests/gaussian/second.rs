@@ -1,18 +1,10 @@
 //! The second implementation, which was written from the extension's text alone, against the oracle and beside the device.
 
-use ash::vk;
-use gaurast::vk::{
-    GaussianAntialiasingGAURAST, GaussianCameraGAURAST, PipelineGaussianStateCreateInfoGAURAST,
-};
-use gaurast_runner::{Need, data};
-use gaurast_second as second;
+use gaurast_conformance::{Draw, Implementation, Outcome, Second, all, cases};
+use gaurast_runner::{Case, Need, Variant, data};
 use gaurast_tests::compare::{Limits, assert_contract};
 use gaurast_tests::contexts::{Context, Settings};
-use gaurast_tests::oracle::sample_tests::compare;
-use gaurast_tests::oracle::{
-    OracleCamera, OracleDepthFormat, OracleState, OracleTests, Stored, render_bounded,
-    render_tested,
-};
+use gaurast_tests::oracle::{OracleCamera, OracleState, Stored, render_bounded};
 use gaurast_tests::scenes::{self, SceneBuffers};
 
 use super::accuracy::{PLANT, SIZE, State, View, draw, generated_view, states, views};
@@ -25,86 +17,6 @@ const LIMITS: Limits = Limits {
     ..Limits::ENVELOPE_ONLY
 };
 
-/// A draw, as the second implementation takes it.
-struct Second<'a> {
-    gaussians: Vec<second::Gaussian<'a>>,
-    camera: second::Camera,
-    viewport: second::Viewport,
-    state: second::State,
-}
-
-impl<'a> Second<'a> {
-    fn new(
-        scene: &'a SceneBuffers,
-        camera: &GaussianCameraGAURAST,
-        size: [u32; 2],
-        state: &PipelineGaussianStateCreateInfoGAURAST,
-    ) -> Self {
-        let coefficients = (scene.degree + 1).pow(2) as usize;
-        let [right, down, forward] = [0, 3, 6].map(|row| {
-            let row: [f32; 3] = camera.rotation[row..row + 3].try_into().expect("a row");
-            row
-        });
-        Self {
-            gaussians: (0..scene.positions.len())
-                .map(|index| second::Gaussian {
-                    position: scene.positions[index],
-                    scale: scene.scales[index],
-                    rotation: scene.rotations[index],
-                    opacity: scene.opacities[index],
-                    harmonics: &scene.sh[index * coefficients..][..coefficients],
-                })
-                .collect(),
-            camera: second::Camera {
-                rotation: [right, down, forward],
-                eye: camera.eye,
-                focal_length: camera.focal_length,
-                principal_point: camera.principal_point,
-                near_plane: camera.near_plane,
-                far_plane: camera.far_plane,
-                depth_coefficients: camera.depth_coefficients,
-            },
-            viewport: second::Viewport::whole(size[0] as usize, size[1] as usize),
-            state: second::State {
-                spherical_harmonics_degree: scene.degree as usize,
-                antialiasing: match state.antialiasing {
-                    GaussianAntialiasingGAURAST::OPACITY_COMPENSATED => {
-                        second::Antialiasing::OpacityCompensated
-                    }
-                    _ => second::Antialiasing::Dilate,
-                },
-                low_pass_variance: state.low_pass_variance,
-                alpha_floor: state.alpha_floor,
-                alpha_ceiling: state.alpha_ceiling,
-                transmittance_floor: state.transmittance_floor,
-            },
-        }
-    }
-
-    /// The picture over nothing.
-    fn picture(&self) -> Vec<[f32; 4]> {
-        let [width, height] = [self.viewport.width, self.viewport.height].map(|side| side as usize);
-        let mut attachments = second::Attachments {
-            width,
-            color: vec![[0.0; 4]; width * height],
-            depth: Vec::new(),
-        };
-        self.draw(None, &mut attachments);
-        attachments.color
-    }
-
-    fn draw(&self, test: Option<second::DepthTest>, attachments: &mut second::Attachments) {
-        second::draw(
-            &self.gaussians,
-            &self.camera,
-            &self.viewport,
-            &self.state,
-            test,
-            attachments,
-        );
-    }
-}
-
 /// Holds the pictures of both implementations against the oracle's.
 fn judge(context: &Context, name: &str, scene: &SceneBuffers, state: State, views: &[View]) {
     let pictures = draw(context, scene, state, views);
@@ -112,7 +24,16 @@ fn judge(context: &Context, name: &str, scene: &SceneBuffers, state: State, view
         let name = format!("{name}, {}", view.name);
         let camera = OracleCamera::new(&view.camera, view.size).expect("a pinhole");
         let reference = render_bounded(&scene.as_oracle(), &camera, &OracleState::from(&state));
-        let ours = Second::new(scene, &view.camera, view.size, &state).picture();
+        let as_data = Draw {
+            size: view.size,
+            ..Draw::new(scene.clone())
+        };
+        let as_data = as_data.in_state(|_| state).seen_by(view.camera);
+        assert_eq!(Second.missing(&as_data), None);
+        let ours = Second
+            .draw(&as_data, &Stored::default())
+            .expect("it draws")
+            .color;
         let verdict = assert_contract(&format!("{name}, second"), &ours, &reference, LIMITS);
         let device = assert_contract(&name, &drawn, &reference, view.limits);
         println!(
@@ -236,101 +157,24 @@ fn both_draw_the_plant() {
     both_draw(PLANT);
 }
 
-/// Depth tests of the second implementation: the device's are held against the same oracle by `depth_stencil`.
-#[gaurast_runner::test]
-fn the_second_tests_and_writes_depths() {
-    use second::CompareOp as Op;
-    let operations = [
-        (vk::CompareOp::NEVER, Op::Never),
-        (vk::CompareOp::LESS, Op::Less),
-        (vk::CompareOp::EQUAL, Op::Equal),
-        (vk::CompareOp::LESS_OR_EQUAL, Op::LessOrEqual),
-        (vk::CompareOp::GREATER, Op::Greater),
-        (vk::CompareOp::NOT_EQUAL, Op::NotEqual),
-        (vk::CompareOp::GREATER_OR_EQUAL, Op::GreaterOrEqual),
-        (vk::CompareOp::ALWAYS, Op::Always),
-    ];
-    let formats = [
-        (OracleDepthFormat::Unorm(16), second::DepthFormat::Unorm16),
-        (OracleDepthFormat::Unorm(24), second::DepthFormat::Unorm24),
-        (OracleDepthFormat::Float, second::DepthFormat::Float32),
-    ];
-    let mut scene = scenes::cloud(47, 1500, 1);
-    for (position, scale) in scene.positions.iter_mut().zip(&mut scene.scales) {
-        // Many at the same depths, some of which are stored.
-        position[2] = (2.0 * position[2]).round() / 2.0;
-        *scale = scale.map(|s| 4.0 * s);
-    }
-    let camera = scenes::camera(SIZE[0], SIZE[1])
-        .to_vulkan()
-        .depth_coefficients([16.0 / 15.0, -16.0 / 15.0]);
-    let oracle = OracleCamera::new(&camera, SIZE).expect("a pinhole");
-    let state = State::default();
-    let pixels = (SIZE[0] * SIZE[1]) as usize;
-    for (oracle_format, format) in formats {
-        for (op, compare_op) in operations {
-            let tests = OracleTests {
-                depth_coefficients: camera.depth_coefficients,
-                depth_range: [0.25, 0.875],
-                format: oracle_format,
-                depth: Some((op, true)),
-                bounds: None,
-                stencil: None,
-            };
-            // Depths of the cloud in stripes.
-            let before = |at: usize| tests.code(oracle.model, 2.0 + (at / 7 % 9) as f32);
-            let stored = Stored {
-                depth: (0..pixels).map(before).collect(),
-                stencil: Vec::new(),
-            };
-            let reference = render_tested(
-                &scene.as_oracle(),
-                &oracle,
-                &OracleState::from(&state),
-                &tests,
-                &stored,
-            );
-            let mut second = Second::new(&scene, &camera, SIZE, &state);
-            second.viewport.min_depth = 0.25;
-            second.viewport.max_depth = 0.875;
-            let behind = [0.25, 0.5, 0.75, 1.0];
-            let mut attachments = second::Attachments {
-                width: SIZE[0] as usize,
-                color: vec![behind; pixels],
-                depth: stored
-                    .depth
-                    .iter()
-                    .map(|&code| oracle_format.depth(code))
-                    .collect(),
-            };
-            let test = second::DepthTest {
-                compare: compare_op,
-                write: true,
-                format,
-            };
-            second.draw(Some(test), &mut attachments);
-            let name = format!("second, {op:?} {oracle_format:?}");
-            let expected = reference.color.over(&vec![behind.map(f64::from); pixels]);
-            assert_contract(&name, &attachments.color, &expected, LIMITS);
-            let mut changed = 0;
-            for (at, &depth) in attachments.depth.iter().enumerate() {
-                let code = oracle_format.code(depth);
-                let allowed = reference.depth[at].as_ref();
-                assert!(
-                    allowed.is_none_or(|allowed| allowed.contains(&code)),
-                    "{name}: pixel {at} stores {code:#x}, not one of {allowed:x?}"
-                );
-                if code != stored.depth[at] {
-                    changed += 1;
-                    assert!(compare(op, code, stored.depth[at]), "{name}: pixel {at}");
-                }
-            }
-            let changes = !matches!(op, vk::CompareOp::NEVER | vk::CompareOp::EQUAL);
-            assert_eq!(
-                changed > pixels / 20,
-                changes,
-                "{name}: {changed} depths written"
-            );
+fn chapters() -> Vec<Variant> {
+    let supported = |chapter: &&str| {
+        let mut cases = all().into_iter().filter(|case| case.chapter == *chapter);
+        cases.any(|case| Second.missing(&case.draw()).is_none())
+    };
+    cases::chapters()
+        .filter(supported)
+        .map(Variant::new)
+        .collect()
+}
+
+#[gaurast_runner::test(each = chapters())]
+fn the_second_passes_the_conformance_cases(case: &Case) {
+    let mut failures = Vec::new();
+    for one in all().iter().filter(|one| one.chapter == case.variant()) {
+        if let Outcome::Fail(failure) = one.run(&Second) {
+            failures.push(format!("{}: {}", one.path(), failure.message));
         }
     }
+    assert!(failures.is_empty(), "{failures:#?}");
 }

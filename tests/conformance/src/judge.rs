@@ -161,7 +161,7 @@ fn tests(draw: &Draw) -> OracleTests {
 type Member = [u32; 2];
 
 /// The sorted sets of a draw, in the order in which ties are broken.
-fn sets(draw: &Draw) -> Vec<Vec<Member>> {
+pub(crate) fn sets(draw: &Draw) -> Vec<Vec<Member>> {
     let merges = draw.state.flags.contains(Flags::MERGE_DRAWS);
     let (mut sets, mut open) = (Vec::<Vec<Member>>::new(), false);
     for call in &draw.calls {
@@ -200,7 +200,7 @@ fn sets(draw: &Draw) -> Vec<Vec<Member>> {
 }
 
 /// The attributes of a set's Gaussians, as they are after conversion to binary32, and their instances.
-fn gathered(draw: &Draw, members: &[Member]) -> (SceneBuffers, Vec<OracleInstance>) {
+pub(crate) fn gathered(draw: &Draw, members: &[Member]) -> (SceneBuffers, Vec<OracleInstance>) {
     let scene = &draw.scene;
     let triples = (scene.degree + 1).pow(2) as usize;
     let stored = |value: f32| {

@@ -13,15 +13,46 @@ pub mod judge;
 pub mod mistakes;
 pub mod record;
 pub mod report;
+pub mod second;
 
 pub use cases::{Case, all};
 pub use device::Device;
 pub use draw::Draw;
+pub use second::Second;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
+use device::Error;
 use gaurast_oracle::compare::write_difference;
+use gaurast_oracle::oracle::Stored;
 use judge::{Expected, expected, stored_before};
+use record::Picture;
+
+/// What is held against the text: a driver's device, or anything else that draws.
+pub trait Implementation {
+    /// What it calls itself.
+    fn name(&self) -> &str;
+
+    /// The first feature, limit or format that a draw needs and it lacks.
+    fn missing(&self, draw: &Draw) -> Option<&'static str>;
+
+    /// Draws, where the depth and stencil attachment holds what is `stored`.
+    ///
+    /// # Errors
+    /// If it fails to.
+    fn draw(&self, draw: &Draw, stored: &Stored) -> Result<Picture, Error>;
+}
+
+/// The implementation of a name: `second`, or a driver as [`Device::open`] takes it.
+///
+/// # Errors
+/// If there is none.
+pub fn open(name: &str) -> Result<Box<dyn Implementation>, Error> {
+    match name {
+        "second" => Ok(Box::new(Second)),
+        driver => Ok(Box::new(Device::open(driver)?)),
+    }
+}
 
 /// What came of a case.
 #[derive(Clone, Debug)]
@@ -54,10 +85,10 @@ impl Failure {
 }
 
 impl Case {
-    /// Draws the case on a device and judges the picture. What the device does not support is not drawn.
-    pub fn run(&self, device: &Device) -> Outcome {
+    /// Has an implementation draw the case, and judges the picture. What it does not support is not drawn.
+    pub fn run(&self, device: &dyn Implementation) -> Outcome {
         let draw = self.draw();
-        if let Some(feature) = draw.missing(device) {
+        if let Some(feature) = device.missing(&draw) {
             return Outcome::NotSupported(feature);
         }
         let before = stored_before(&draw);

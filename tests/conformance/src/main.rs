@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use clap::Parser;
 use gaurast_conformance::report::{Counts, Result, junit};
-use gaurast_conformance::{Case, Device, Outcome, all, cases};
+use gaurast_conformance::{Case, Implementation, Outcome, all, cases, open};
 
 /// Runs the conformance cases of VK_GAURAST_gaussian_primitive_topology on a driver.
 ///
@@ -14,7 +14,7 @@ use gaurast_conformance::{Case, Device, Outcome, all, cases};
 #[derive(Debug, Parser)]
 #[command(name = "gaurast-conformance", version)]
 struct Arguments {
-    /// `embedded`; a manifest for the Vulkan loader (ICD.json); `loader`, its first device that draws Gaussians; or a part of
+    /// `embedded`; a manifest for the Vulkan loader (ICD.json); `second`, the second implementation; `loader`, its first device that draws Gaussians; or a part of
     /// such a device's name
     #[arg(long, value_name = "NAME|ICD.json", default_value = "embedded")]
     driver: String,
@@ -56,7 +56,7 @@ fn main() -> ExitCode {
         }
         return ExitCode::SUCCESS;
     }
-    let device = match Device::open(&arguments.driver) {
+    let device = match open(&arguments.driver) {
         Ok(device) => device,
         Err(error) => {
             eprintln!("{}: {}", arguments.driver, error.0);
@@ -65,12 +65,12 @@ fn main() -> ExitCode {
     };
     #[cfg(feature = "mistakes")]
     if arguments.mistakes {
-        return gaurast_conformance::mistakes::prove(&device, &cases);
+        return gaurast_conformance::mistakes::prove(&*device, &cases);
     }
-    println!("{} cases on {}", cases.len(), device.name);
+    println!("{} cases on {}", cases.len(), device.name());
     let results: Vec<Result> = cases
         .iter()
-        .map(|case| run(&device, case, &arguments))
+        .map(|case| run(&*device, case, &arguments))
         .collect();
     for chapter in cases::chapters() {
         let own: Vec<&Result> = results
@@ -86,7 +86,7 @@ fn main() -> ExitCode {
     let counts = Counts::of(&results);
     println!("{:15} {}", "all", line(counts));
     if let Some(path) = &arguments.junit
-        && let Err(error) = std::fs::write(path, junit(&device.name, &results))
+        && let Err(error) = std::fs::write(path, junit(device.name(), &results))
     {
         eprintln!("{}: {error}", path.display());
         return ExitCode::from(2);
@@ -108,7 +108,7 @@ fn line(counts: Counts) -> String {
 }
 
 /// Runs a case, and prints what came of it.
-fn run(device: &Device, case: &Case, arguments: &Arguments) -> Result {
+fn run(device: &dyn Implementation, case: &Case, arguments: &Arguments) -> Result {
     let start = Instant::now();
     let outcome = case.run(device);
     let time = start.elapsed();

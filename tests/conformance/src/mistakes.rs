@@ -5,11 +5,11 @@ use std::process::ExitCode;
 
 use simdevice::mistakes::{Mistake, make};
 
-use crate::{Case, Device, Outcome};
+use crate::{Case, Implementation, Outcome};
 
 /// Has the device make each mistake, and prints which cases catch it, by chapter. Fails if none does, or if a case fails where
 /// no mistake is made.
-pub fn prove(device: &Device, cases: &[Case]) -> ExitCode {
+pub fn prove(device: &dyn Implementation, cases: &[Case]) -> ExitCode {
     let mut escaped = 0;
     make(None);
     let failing = failing(device, cases);
@@ -50,7 +50,7 @@ pub fn prove(device: &Device, cases: &[Case]) -> ExitCode {
     }
 }
 
-fn failing<'a>(device: &Device, cases: &'a [Case]) -> Vec<&'a Case> {
+fn failing<'a>(device: &dyn Implementation, cases: &'a [Case]) -> Vec<&'a Case> {
     let fails = |case: &&Case| matches!(case.run(device), Outcome::Fail(_));
     cases.iter().filter(fails).collect()
 }

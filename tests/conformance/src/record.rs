@@ -8,6 +8,7 @@ use gaurast::vk::{
 use gaurast_oracle::oracle::Stored;
 use half::f16;
 
+use crate::Implementation;
 use crate::device::{Buffer, Device, Error, Image, Scope, whole};
 use crate::draw::{Blend, Call, ColorFormat, Draw};
 
@@ -27,12 +28,16 @@ const BINDINGS: u32 = 5;
 const MODEL_MATRIX: u32 = 20;
 const MODEL_OPACITY: u32 = 23;
 
-impl Device {
-    /// Draws.
-    ///
-    /// # Errors
-    /// If a command fails.
-    pub fn draw(&self, draw: &Draw, stored: &Stored) -> Result<Picture, Error> {
+impl Implementation for Device {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn missing(&self, draw: &Draw) -> Option<&'static str> {
+        draw.missing(self)
+    }
+
+    fn draw(&self, draw: &Draw, stored: &Stored) -> Result<Picture, Error> {
         let scope = Scope::new(self);
         let targets = Targets::new(&scope, draw, stored)?;
         let (pipeline, layout) = pipeline(&scope, draw)?;

@@ -8,8 +8,8 @@ use gaurast::vk::{
 
 use super::Chapter;
 use super::scenes::{
-    Gaussian, SceneBuffers, ball, cameras, cloud, dense, front, layered, many, parallels, pinholes,
-    strange,
+    Gaussian, SceneBuffers, ball, cameras, cloud, dense, few, front, layered, many, parallels,
+    pinholes, strange,
 };
 use crate::draw::{Draw, State};
 
@@ -324,7 +324,7 @@ pub(super) fn binary16(chapter: &mut Chapter<'_>) {
         for (order_name, order) in &ORDERS[..3] {
             let order = *order;
             chapter.add(format!("{name}.{order_name}"), move || {
-                Draw::new(cloud(17, 400, 1))
+                Draw::new(few(17, 1))
                     .in_state(|state| half(state).order(order))
                     .seen_by(camera)
             });
@@ -349,7 +349,7 @@ pub(super) fn binary16(chapter: &mut Chapter<'_>) {
     ];
     for (name, change) in states {
         chapter.add(name, move || {
-            Draw::new(cloud(18, 400, 0)).in_state(|state| change(half(state)))
+            Draw::new(few(18, 0)).in_state(|state| change(half(state)))
         });
     }
 }

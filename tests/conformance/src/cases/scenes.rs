@@ -14,6 +14,15 @@ pub(super) fn dense(seed: u64, degree: u32) -> SceneBuffers {
     scene
 }
 
+/// A few large ones: the oracle of binary16 looks at each of them at every pixel.
+pub(super) fn few(seed: u64, degree: u32) -> SceneBuffers {
+    let mut scene = cloud(seed, 100, degree);
+    for scale in scene.scales.as_flattened_mut() {
+        *scale *= 10.0;
+    }
+    scene
+}
+
 /// A dense cloud in which many Gaussians are at the same depths.
 pub(super) fn layered(seed: u64, degree: u32) -> SceneBuffers {
     let mut scene = dense(seed, degree);
