@@ -21,9 +21,10 @@ use glam::DVec3;
 
 use super::{PLAYBOT, SKULL};
 
-const PLANT: &str = "splats/plant.splat";
+/// A trained scene of the real data.
+pub(crate) const PLANT: &str = "splats/plant.splat";
 
-type State = PipelineGaussianStateCreateInfoGAURAST<'static>;
+pub(crate) type State = PipelineGaussianStateCreateInfoGAURAST<'static>;
 
 /// Devices of a SIMD level: with one thread, and with two.
 pub(crate) struct Devices<'a> {
@@ -85,7 +86,7 @@ pub(crate) struct View {
 }
 
 /// Pictures of `scene`.
-fn draw(
+pub(crate) fn draw(
     context: &Context,
     scene: &SceneBuffers,
     state: State,
@@ -114,7 +115,7 @@ fn draw(
 }
 
 /// The states in which generated scenes are drawn.
-fn states() -> [(&'static str, State); 4] {
+pub(crate) fn states() -> [(&'static str, State); 4] {
     let default = State::default();
     [
         ("default", default),
@@ -297,7 +298,7 @@ fn awkward_scenes_stay_within_the_envelope_in_every_state(case: &Case) {
 
 /// The cameras that real scenes are seen by: the whole of it, a side of it from nearby, and one in
 /// its middle.
-fn views(scene: &Scene) -> Vec<View> {
+pub(crate) fn views(scene: &Scene) -> Vec<View> {
     let (centre, radius) = bulk(scene);
     let look = |from: [f64; 3], to: [f64; 3], fov, size| {
         let [eye, target] = [from, to].map(|at| (centre + radius * DVec3::from(at)).into());

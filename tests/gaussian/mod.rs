@@ -3,6 +3,7 @@
 mod accuracy;
 mod approximations;
 mod cameras;
+mod conformance_cases;
 mod depth_stencil;
 mod determinism;
 mod given_scenes;
@@ -13,6 +14,7 @@ mod popping;
 mod rasterization_modes;
 mod recorded_work;
 mod reference;
+mod second;
 mod shaded;
 mod viewer;
 mod what_ifs;

@@ -3,6 +3,8 @@
 
 use super::depth::CenterDepth;
 use super::footprint::Visible;
+#[cfg(feature = "mistakes")]
+use crate::mistakes::Mistake;
 use crate::state::Viewport;
 use crate::state::gaussian::{
     Camera, CameraModel, GaussianGeometry, GaussianLinearization, GaussianOrder, GaussianPrecision,
@@ -63,6 +65,12 @@ impl ViewConstants {
         let principal = camera.principal_point.map(f64::from);
         let size = [viewport.width, viewport.height].map(f64::from);
         let margin = [0, 1].map(|axis| 0.15 * size[axis] / focal[axis]);
+        #[cfg(feature = "mistakes")]
+        let margin = if Mistake::SlopesUnclamped.is_made() {
+            [f64::INFINITY; 2]
+        } else {
+            margin
+        };
         Self {
             model: camera.model,
             unscented: state.linearization == GaussianLinearization::Unscented,
@@ -108,6 +116,10 @@ impl ViewConstants {
 
 /// After how many pixels a camera's picture repeats to the right and to the left, if it does.
 pub(super) fn period(camera: &Camera) -> Option<f64> {
+    #[cfg(feature = "mistakes")]
+    if Mistake::PanoramaEnds.is_made() {
+        return None;
+    }
     let focal = f64::from(camera.focal_length[0]);
     (camera.model == CameraModel::Equirectangular).then_some(std::f64::consts::TAU * focal)
 }

@@ -31,6 +31,10 @@ impl CenterDepth {
     /// Of a camera and a viewport, for an attachment of `format`.
     pub(crate) fn new(camera: &Camera, viewport: &Viewport, format: Format) -> Self {
         Self {
+            #[cfg(feature = "mistakes")]
+            is_linear: camera.model == CameraModel::Orthographic
+                && !crate::mistakes::Mistake::ParallelDepthInverse.is_made(),
+            #[cfg(not(feature = "mistakes"))]
             is_linear: camera.model == CameraModel::Orthographic,
             coefficients: camera.depth_coefficients.map(f64::from),
             range: [viewport.min_depth, viewport.max_depth].map(f64::from),
@@ -56,6 +60,10 @@ impl CenterDepth {
             DepthEncoding::Float => (depth as f32).to_bits(),
             DepthEncoding::Unorm(bits) => {
                 let greatest = f64::from((1u32 << bits) - 1);
+                #[cfg(feature = "mistakes")]
+                if crate::mistakes::Mistake::DepthRoundedDown.is_made() {
+                    return (depth * greatest).floor() as u32;
+                }
                 (depth * greatest).round_ties_even() as u32
             }
         }

@@ -19,6 +19,8 @@ use super::splat::{ProjectedGroup, Splat, are_steep, binary16_headroom};
 use super::surfel::surfel_of;
 use super::tiles::find_tiles;
 use super::{camera, panorama, unscented};
+#[cfg(feature = "mistakes")]
+use crate::mistakes::Mistake;
 use crate::packet::GaussianAppend;
 use crate::runtime::Runtime;
 use crate::state::gaussian::{CameraModel, GaussianGeometry, GaussianOrder, GaussianPrecision};
@@ -219,14 +221,20 @@ fn flatten<S: Simd>(view: &ViewConstants, simd: S, source: &Source<'_>, scratch:
         unscented::transform(view, by_matrices, scratch);
     }
     let moments = &*scratch.moments;
+    #[cfg(feature = "mistakes")]
+    let of_models = !Mistake::DirectionsOfWorld.is_made();
+    #[cfg(not(feature = "mistakes"))]
+    let of_models = true;
     let toward = match &scratch.placed {
-        Some(placed) if by_matrices => &placed.toward,
+        Some(placed) if by_matrices && of_models => &placed.toward,
         _ => &*scratch.offset,
     };
     let number = |value: f64| S::f64s::splat(simd, value);
     let load =
         |lanes: &GroupF64, at: usize| S::f64s::from_slice(simd, &lanes[at..at + S::f64s::LEN]);
     let (scale, rotation, opacity) = (&*scratch.scale, &*scratch.rotation, &*scratch.opacity);
+    #[cfg(feature = "mistakes")]
+    let rotation = &mistaken_rotation(rotation);
     let flat = &mut *scratch.flat;
     let r = view.rotation;
     let (one, two) = (number(1.0), number(2.0));
@@ -307,6 +315,17 @@ fn flatten<S: Simd>(view: &ViewConstants, simd: S, source: &Source<'_>, scratch:
     }
 }
 
+/// Quaternions, the scalar taken to be where it is not.
+#[cfg(feature = "mistakes")]
+fn mistaken_rotation(rotation: &[GroupF64; 4]) -> [GroupF64; 4] {
+    let [w, x, y, z] = rotation.clone();
+    if Mistake::QuaternionScalarLast.is_made() {
+        [z, w, x, y]
+    } else {
+        [w, x, y, z]
+    }
+}
+
 /// What the tile engine and the search for tiles need of Gaussians from lane `at` on, given their covariances on the
 /// screen before the low-pass filter (xx, xy, yy), the determinants of those, and opacities.
 #[inline(always)]
@@ -357,6 +376,10 @@ pub(super) fn shape<S: Simd>(
             flat.half[0][lane] = binary16_headroom(factor, room) * (2.0 * LN_2);
         }
         extent = S::f64s::from_slice(simd, &flat.half[0][at..at + S::f64s::LEN]);
+    }
+    #[cfg(feature = "mistakes")]
+    if Mistake::ThreeSigmaBox.is_made() {
+        extent = extent.min(number(9.0));
     }
     let half_x = (a * extent).sqrt();
     store(half_x, &mut flat.half[0]);
@@ -433,6 +456,10 @@ fn find_keys(view: &ViewConstants, sequence: impl Fn(usize) -> u32, scratch: &mu
         GaussianOrder::ViewDepth => {
             for (key, &depth) in keys.iter_mut().zip(&*scratch.depth) {
                 *key = ordered_bits(depth as f32);
+                #[cfg(feature = "mistakes")]
+                {
+                    *key = crate::mistakes::key(depth, *key);
+                }
             }
         }
         GaussianOrder::RadialDistance => {
@@ -474,6 +501,12 @@ pub(super) fn emit<S: Simd>(
     find_keys(view, sequence, scratch);
     let reader = &source.reader;
     let degree = view.sh_degree;
+    #[cfg(feature = "mistakes")]
+    let degree = if Mistake::NoDegree4.is_made() {
+        degree.min(3)
+    } else {
+        degree
+    };
     let floats = reader.floats();
     let mut read = [0.0; COEFFICIENT_FLOATS];
     let (mut directions, mut bases) = ([[0.0; DIRECTIONS]; 3], Bases::default());
@@ -482,6 +515,10 @@ pub(super) fn emit<S: Simd>(
         for (parts, lanes) in directions.iter_mut().zip(&scratch.flat.direction) {
             for (part, &at) in parts.iter_mut().zip(group) {
                 *part = lanes[at % GROUP] as f32;
+                #[cfg(feature = "mistakes")]
+                if Mistake::HarmonicsReversed.is_made() {
+                    *part = -*part;
+                }
             }
         }
         bases.find(simd, degree, &directions);

@@ -256,7 +256,7 @@ impl Step<'_> {
         let Alpha { value, error } = self.alpha;
         let contributes = value >= floor;
         // No alpha is below a floor of 0, whatever its error.
-        let undecidable = floor > 0.0 && (value - floor).abs() <= error;
+        let undecidable = floor > 0.0 && (value - floor).abs() < error;
         if let Some(mut other) = self.part(path, undecidable) {
             if !contributes {
                 self.finish_or_blend(&mut other);
@@ -277,7 +277,7 @@ impl Step<'_> {
         // Where 1 - alpha rounds to 1, T doesn't change, and it has passed this test before.
         let undecidable = floor > 0.0
             && self.alpha.value > 0.5 * UNIT_ROUNDOFF
-            && (behind.value - floor).abs() <= behind.error;
+            && (behind.value - floor).abs() < behind.error;
         let finishes = behind.value < floor;
         if let Some(mut other) = self.part(path, undecidable) {
             if finishes {

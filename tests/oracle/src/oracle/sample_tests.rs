@@ -181,7 +181,7 @@ impl Sample<'_> {
     /// Notes whether a Gaussian reaches the pixel at all.
     fn reach(&mut self, alpha: Alpha, state: &OracleState) {
         let floor = f64::from(state.alpha_floor);
-        self.reached[0] |= floor == 0.0 || alpha.value - alpha.error > floor;
+        self.reached[0] |= floor == 0.0 || alpha.value - alpha.error >= floor;
         self.reached[1] |= alpha.value + alpha.error >= floor;
     }
 

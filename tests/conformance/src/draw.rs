@@ -1,0 +1,356 @@
+//! A draw as plain data: what an application records, and what the oracle is asked.
+
+use ash::vk;
+use gaurast::vk::{
+    GaussianAntialiasingGAURAST as Antialiasing, GaussianCameraGAURAST,
+    GaussianCameraModelGAURAST as Model, GaussianGeometryGAURAST as Geometry,
+    GaussianLinearizationGAURAST as Linearization, GaussianOrderGAURAST as Order,
+    GaussianPrecisionGAURAST as Precision, PipelineGaussianStateCreateInfoGAURAST,
+};
+use gaurast_oracle::oracle::{OracleDepthFormat, OracleInstance};
+use gaurast_oracle::scenes::{self, SceneBuffers};
+
+use crate::device::Device;
+
+/// The Gaussian state of a pipeline.
+pub type State = PipelineGaussianStateCreateInfoGAURAST<'static>;
+
+/// A camera.
+pub type Camera = GaussianCameraGAURAST<'static>;
+
+/// Width and height of pictures, in pixels. Odd, so that tiles are cut.
+pub const SIZE: [u32; 2] = [107, 83];
+
+/// One render pass with Gaussian draws, and what it begins with.
+#[derive(Clone, Debug)]
+pub struct Draw {
+    /// What lies in the vertex buffers.
+    pub scene: SceneBuffers,
+    /// Attributes are stored as binary16.
+    pub half: bool,
+    /// The pipeline's degree, at most that of the scene.
+    pub degree: u32,
+    /// The Gaussian state; its degree and locations are filled in.
+    pub state: State,
+    /// `exponentialError` and `contributionBudget`, if the structure is chained.
+    pub approximation: Option<[f32; 2]>,
+    /// The camera.
+    pub camera: Camera,
+    /// The camera comes from a uniform buffer.
+    pub camera_in_buffer: bool,
+    /// Model matrices with factors of the opacity, and how they advance.
+    pub instances: Option<(vk::VertexInputRate, Vec<OracleInstance>)>,
+    /// The index buffer.
+    pub indices: Vec<u32>,
+    /// What is recorded.
+    pub calls: Vec<Call>,
+    /// Width and height of the attachments, in pixels.
+    pub size: [u32; 2],
+    /// The viewport, if it is not the whole attachment.
+    pub viewport: Option<vk::Viewport>,
+    /// The scissor, if it is not the whole attachment.
+    pub scissor: Option<vk::Rect2D>,
+    /// The render area, if it is not the whole attachment.
+    pub area: Option<vk::Rect2D>,
+    /// The colour attachment's format, one of [`ColorFormat`]s.
+    pub format: ColorFormat,
+    /// What the colour attachment holds before.
+    pub behind: [f32; 4],
+    /// How fragments are blended.
+    pub blend: Blend,
+    /// Components that are written.
+    pub write_mask: vk::ColorComponentFlags,
+    /// Depth and stencil.
+    pub depth: Option<Depth>,
+    /// Samples of a pixel.
+    pub samples: u32,
+    /// Samples that are written.
+    pub sample_mask: u32,
+}
+
+/// A command.
+#[derive(Clone, Copy, Debug)]
+pub enum Call {
+    /// `vkCmdDraw`.
+    Draw {
+        /// The first vertex and their number.
+        vertices: [u32; 2],
+        /// The first instance and their number.
+        instances: [u32; 2],
+    },
+    /// `vkCmdDrawIndexed` of one instance.
+    Indexed {
+        /// The first index and their number.
+        indices: [u32; 2],
+        /// What is added to each.
+        offset: i32,
+    },
+    /// `vkCmdDrawIndirect` of one draw, whose parameters lie in a buffer.
+    Indirect {
+        /// The first vertex and their number.
+        vertices: [u32; 2],
+    },
+    /// `vkCmdSetScissor` to what it is: the set ends.
+    EndSet,
+}
+
+/// How a fragment reaches the colour attachment.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Blend {
+    /// `ONE`, `ONE_MINUS_SRC_ALPHA`.
+    Over,
+    /// Blending is off.
+    Replace,
+    /// `ONE`, `ONE`.
+    Add,
+    /// `ONE_MINUS_DST_ALPHA`, `ONE`: what is drawn lies behind.
+    Under,
+}
+
+/// A colour attachment's format.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ColorFormat {
+    /// `R32G32B32A32_SFLOAT`.
+    Float32,
+    /// `R16G16B16A16_SFLOAT`.
+    Float16,
+    /// `R8G8B8A8_UNORM`.
+    Unorm8,
+}
+
+impl ColorFormat {
+    /// The format, as Vulkan names it.
+    pub fn raw(self) -> vk::Format {
+        match self {
+            Self::Float32 => vk::Format::R32G32B32A32_SFLOAT,
+            Self::Float16 => vk::Format::R16G16B16A16_SFLOAT,
+            Self::Unorm8 => vk::Format::R8G8B8A8_UNORM,
+        }
+    }
+
+    /// Bytes of a texel.
+    pub(crate) fn texel(self) -> u64 {
+        match self {
+            Self::Float32 => 16,
+            Self::Float16 => 8,
+            Self::Unorm8 => 4,
+        }
+    }
+
+    /// What storing a number of at most `greatest` may change of it: half a step.
+    pub(crate) fn rounding(self, greatest: f64) -> f64 {
+        match self {
+            Self::Float32 => 0.0,
+            Self::Float16 => greatest.max(1.0) / 2048.0,
+            Self::Unorm8 => 0.501 / 255.0,
+        }
+    }
+}
+
+/// A depth and stencil attachment, what it holds before, and the tests.
+#[derive(Clone, Copy, Debug)]
+pub struct Depth {
+    /// `D16_UNORM`, `D32_SFLOAT`, `X8_D24_UNORM_PACK32` or `D32_SFLOAT_S8_UINT`.
+    pub format: vk::Format,
+    /// The comparison and whether depths are written, if there is a test.
+    pub test: Option<(vk::CompareOp, bool)>,
+    /// The least and the greatest stored depth, if they are tested.
+    pub bounds: Option<[f32; 2]>,
+    /// The stencil test.
+    pub stencil: Option<vk::StencilOpState>,
+    /// What is stored: the depths of these depth variables in stripes, and stencils 0 to 7.
+    pub stripes: [f32; 6],
+}
+
+impl Depth {
+    pub(crate) fn oracle_format(&self) -> OracleDepthFormat {
+        match self.format {
+            vk::Format::D16_UNORM => OracleDepthFormat::Unorm(16),
+            vk::Format::X8_D24_UNORM_PACK32 => OracleDepthFormat::Unorm(24),
+            _ => OracleDepthFormat::Float,
+        }
+    }
+
+    pub(crate) fn has_stencil(&self) -> bool {
+        self.format == vk::Format::D32_SFLOAT_S8_UINT
+    }
+
+    /// Bytes of a depth.
+    pub(crate) fn texel(&self) -> u64 {
+        if self.format == vk::Format::D16_UNORM {
+            2
+        } else {
+            4
+        }
+    }
+}
+
+impl Draw {
+    /// All of a scene in the default state, over nothing, from in front.
+    pub fn new(scene: SceneBuffers) -> Self {
+        let count = scene.positions.len() as u32;
+        Self {
+            half: false,
+            degree: scene.degree,
+            scene,
+            state: State::default(),
+            approximation: None,
+            camera: scenes::camera(SIZE[0], SIZE[1]).to_vulkan(),
+            camera_in_buffer: false,
+            instances: None,
+            indices: Vec::new(),
+            calls: vec![Call::Draw {
+                vertices: [0, count],
+                instances: [0, 1],
+            }],
+            size: SIZE,
+            viewport: None,
+            scissor: None,
+            area: None,
+            format: ColorFormat::Float32,
+            behind: [0.0; 4],
+            blend: Blend::Over,
+            write_mask: vk::ColorComponentFlags::RGBA,
+            depth: None,
+            samples: 1,
+            sample_mask: u32::MAX,
+        }
+    }
+
+    /// The same in another state.
+    #[must_use]
+    pub fn in_state(mut self, change: impl FnOnce(State) -> State) -> Self {
+        self.state = change(self.state);
+        self
+    }
+
+    /// The same through another camera.
+    #[must_use]
+    pub fn seen_by(mut self, camera: Camera) -> Self {
+        self.camera = camera;
+        self
+    }
+
+    /// The viewport.
+    pub(crate) fn viewport(&self) -> vk::Viewport {
+        self.viewport.unwrap_or_else(|| {
+            let [width, height] = self.size.map(|side| side as f32);
+            vk::Viewport::default()
+                .width(width)
+                .height(height)
+                .max_depth(1.0)
+        })
+    }
+
+    /// The first feature or limit that the draw needs and the device lacks.
+    pub fn missing(&self, device: &Device) -> Option<&'static str> {
+        let has = &device.features;
+        let state = &self.state;
+        let depth = self.depth.as_ref();
+        let any = self
+            .approximation
+            .is_some_and(|numbers| numbers != [0.0; 2]);
+        let needs = [
+            (
+                state.order == Order::RADIAL_DISTANCE,
+                has.radial_distance_order,
+                "radialDistanceOrder",
+            ),
+            (
+                state.order == Order::PRIMITIVE,
+                has.primitive_order,
+                "primitiveOrder",
+            ),
+            (
+                state.order == Order::PER_PIXEL,
+                has.per_pixel_order,
+                "perPixelOrder",
+            ),
+            (
+                state.precision == Precision::FLOAT16,
+                has.rasterization_float16,
+                "rasterizationFloat16",
+            ),
+            (
+                state.antialiasing == Antialiasing::OPACITY_COMPENSATED,
+                has.opacity_compensation,
+                "opacityCompensation",
+            ),
+            (
+                self.camera.model == Model::ORTHOGRAPHIC,
+                has.orthographic_camera,
+                "orthographicCamera",
+            ),
+            (
+                self.camera.model == Model::FISHEYE,
+                has.fisheye_camera,
+                "fisheyeCamera",
+            ),
+            (
+                self.camera.model == Model::EQUIRECTANGULAR,
+                has.equirectangular_camera,
+                "equirectangularCamera",
+            ),
+            (
+                state.linearization == Linearization::UNSCENTED,
+                has.unscented_projection,
+                "unscentedProjection",
+            ),
+            (
+                state.geometry == Geometry::GAUSSIAN_2D,
+                has.gaussian_2d,
+                "gaussian2D",
+            ),
+            (
+                self.camera_in_buffer,
+                has.uniform_buffer_camera,
+                "uniformBufferCamera",
+            ),
+            (!state.flags.is_empty(), has.merged_draws, "mergedDraws"),
+            (
+                self.instances.is_some(),
+                has.gaussian_instancing,
+                "gaussianInstancing",
+            ),
+            (
+                depth
+                    .is_some_and(|d| d.test.is_some() || d.bounds.is_some() || d.stencil.is_some()),
+                has.gaussian_depth_stencil,
+                "gaussianDepthStencil",
+            ),
+            (
+                self.samples > 1,
+                has.gaussian_multisample,
+                "gaussianMultisample",
+            ),
+            (any, has.gaussian_approximation, "gaussianApproximation"),
+        ];
+        let lacks = needs
+            .iter()
+            .find(|(needed, offered, _)| *needed && *offered == vk::FALSE);
+        if let Some((_, _, name)) = lacks {
+            return Some(name);
+        }
+        if self.degree > device.properties.max_spherical_harmonics_degree {
+            return Some("maxSphericalHarmonicsDegree");
+        }
+        let counts = device.properties.gaussian_sample_counts;
+        if !counts.contains(vk::SampleCountFlags::from_raw(self.samples)) {
+            return Some("gaussianSampleCounts");
+        }
+        use vk::FormatFeatureFlags as F;
+        let copies = F::TRANSFER_SRC | F::TRANSFER_DST;
+        let color = F::COLOR_ATTACHMENT | F::COLOR_ATTACHMENT_BLEND | copies;
+        if !device.has_format(self.format.raw(), color) {
+            return Some("the colour attachment's format");
+        }
+        let tested = F::DEPTH_STENCIL_ATTACHMENT | copies;
+        if depth.is_some_and(|depth| !device.has_format(depth.format, tested)) {
+            return Some("the depth attachment's format");
+        }
+        if depth.is_some_and(|depth| depth.bounds.is_some()) && !device.has_depth_bounds() {
+            return Some("depthBounds");
+        }
+        None
+    }
+}

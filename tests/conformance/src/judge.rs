@@ -1,0 +1,358 @@
+//! What a [`Draw`] must give, by the oracle, and whether a picture is that.
+
+use std::collections::BTreeMap;
+
+use ash::vk;
+use gaurast::vk::{
+    GaussianPrecisionGAURAST as Precision, PipelineGaussianStateCreateFlagsGAURAST as Flags,
+};
+use gaurast_oracle::compare::{Limits, Verdict, verdict};
+use gaurast_oracle::oracle::project::project;
+use gaurast_oracle::oracle::{
+    OracleCamera, OracleInstance, OracleScene, OracleState, OracleStencil, OracleTests, Reference,
+    Stored, render_binary16, render_bounded, render_tested,
+};
+use gaurast_oracle::scenes::SceneBuffers;
+use half::f16;
+
+use crate::draw::{Blend, Call, ColorFormat, Draw};
+use crate::record::Picture;
+
+/// The distance from the envelope that the extension's text allows, per unit of the greatest colour above 1.
+const CONTRACT: f64 = 5e-6;
+
+/// What the attachments may hold after a draw.
+#[derive(Clone, Debug)]
+pub struct Expected {
+    /// Colours.
+    pub color: Reference,
+    /// How far a colour may be from the envelope.
+    pub distance: f64,
+    /// Depths that each pixel may store, `None` where that is not known; empty where none is compared.
+    pub depth: Vec<Option<Vec<u32>>>,
+    /// Stencils that each pixel may store; empty where none is compared.
+    pub stencil: Vec<Vec<u8>>,
+}
+
+/// What the depth and stencil attachment of a draw holds before.
+pub fn stored_before(draw: &Draw) -> Stored {
+    let Some(depth) = &draw.depth else {
+        return Stored::default();
+    };
+    let tests = tests(draw);
+    let model = oracle_camera(draw).model;
+    let pixels = (draw.size[0] * draw.size[1]) as usize;
+    let width = draw.size[0] as usize;
+    let code = |at: usize| match draw.samples {
+        1 => tests.code(model, depth.stripes[(at % width / 5 + at / width / 9) % 6]),
+        _ => tests.format.code(1.0),
+    };
+    let stencils = if depth.has_stencil() { pixels } else { 0 };
+    Stored {
+        depth: (0..pixels).map(code).collect(),
+        stencil: (0..stencils)
+            .map(|at| match draw.samples {
+                1 => (at / 3 % 8) as u8,
+                _ => 0,
+            })
+            .collect(),
+    }
+}
+
+/// What a draw must give.
+pub fn expected(draw: &Draw, before: &Stored) -> Expected {
+    let pixels = (draw.size[0] * draw.size[1]) as usize;
+    let state = OracleState::from(&draw.state);
+    let camera = oracle_camera(draw);
+    let mut color = Reference {
+        width: draw.size[0],
+        height: draw.size[1],
+        nominal: vec![stored_color(draw, draw.behind.map(f64::from)); pixels],
+        alternatives: BTreeMap::new(),
+        exhausted: 0,
+        skips: Default::default(),
+        undecidable_keys: 0,
+    };
+    let (mut depth, mut stencil, mut greatest) = (Vec::new(), Vec::new(), 1.0_f64);
+    let sets = sets(draw);
+    for members in &sets {
+        let (scene, instances) = gathered(draw, members);
+        let scene = OracleScene {
+            requested_degree: draw.degree,
+            instances: &instances,
+            ..scene.as_oracle()
+        };
+        let colors =
+            (0..scene.len()).filter_map(|index| project(&scene, &camera, &state, index).ok());
+        greatest = colors
+            .flat_map(|splat| splat.color)
+            .fold(greatest, f64::max);
+        let drawn = if draw.depth.is_some() {
+            let tested = render_tested(&scene, &camera, &state, &tests(draw), before);
+            if draw.samples == 1 {
+                (depth, stencil) = (tested.depth, tested.stencil);
+            }
+            tested.color
+        } else if draw.state.precision == Precision::FLOAT16 {
+            render_binary16(&scene, &camera, &state)
+        } else {
+            render_bounded(&scene, &camera, &state)
+        };
+        blend(draw, &mut color, &drawn);
+    }
+    if draw
+        .depth
+        .as_ref()
+        .is_some_and(|depth| !depth.has_stencil())
+    {
+        stencil.clear();
+    }
+    Expected {
+        color,
+        distance: distance(draw, greatest, sets.len()),
+        depth,
+        stencil,
+    }
+}
+
+/// How far a colour may be from the envelope, where none drawn is greater than `greatest`.
+fn distance(draw: &Draw, greatest: f64, sets: usize) -> f64 {
+    let behind = draw.behind.iter().fold(0.0_f32, |most, c| most.max(*c));
+    let range = greatest.max(behind.into());
+    let approximate = match draw.approximation {
+        Some([error, budget]) => {
+            let state = &draw.state;
+            let left =
+                f64::from(state.transmittance_floor) / (1.0 - f64::from(state.alpha_ceiling));
+            let finished = if error > 0.0 { left } else { 0.0 };
+            range * (f64::from(error) + f64::from(budget) + finished)
+        }
+        None => 0.0,
+    };
+    // binary16 is defined to the bit; what remains is the blending of its fragments.
+    let exact = match draw.state.precision {
+        Precision::FLOAT16 => 3e-7,
+        _ => CONTRACT,
+    };
+    let stored = draw.format.rounding(2.0 * range) * (1 + sets) as f64;
+    range * exact + approximate + stored
+}
+
+fn oracle_camera(draw: &Draw) -> OracleCamera {
+    let viewport = draw.viewport();
+    let size = [viewport.width, viewport.height.abs()].map(|side| side as u32);
+    OracleCamera::new(&draw.camera, size).expect("one of the four models")
+}
+
+fn tests(draw: &Draw) -> OracleTests {
+    let depth = draw.depth.as_ref().expect("a depth attachment");
+    let viewport = draw.viewport();
+    OracleTests {
+        depth_coefficients: draw.camera.depth_coefficients,
+        depth_range: [viewport.min_depth, viewport.max_depth],
+        format: depth.oracle_format(),
+        depth: depth.test,
+        bounds: depth.bounds,
+        stencil: depth.stencil.map(|state| OracleStencil { state }),
+    }
+}
+
+/// A Gaussian of a set: its vertex and its instance.
+type Member = [u32; 2];
+
+/// The sorted sets of a draw, in the order in which ties are broken.
+pub(crate) fn sets(draw: &Draw) -> Vec<Vec<Member>> {
+    let merges = draw.state.flags.contains(Flags::MERGE_DRAWS);
+    let (mut sets, mut open) = (Vec::<Vec<Member>>::new(), false);
+    for call in &draw.calls {
+        let members: Vec<Member> = match *call {
+            Call::Draw {
+                vertices: [first, count],
+                instances: [first_instance, instances],
+            } => (first_instance..first_instance + instances)
+                .flat_map(|instance| (first..first + count).map(move |vertex| [vertex, instance]))
+                .collect(),
+            Call::Indirect {
+                vertices: [first, count],
+            } => (first..first + count).map(|vertex| [vertex, 0]).collect(),
+            Call::Indexed {
+                indices: [first, count],
+                offset,
+            } => {
+                let indices = &draw.indices[first as usize..][..count as usize];
+                indices
+                    .iter()
+                    .map(|index| [index.wrapping_add_signed(offset), 0])
+                    .collect()
+            }
+            Call::EndSet => {
+                open = false;
+                continue;
+            }
+        };
+        match sets.last_mut() {
+            Some(set) if open && merges => set.extend(members),
+            _ => sets.push(members),
+        }
+        open = true;
+    }
+    sets
+}
+
+/// The attributes of a set's Gaussians, as they are after conversion to binary32, and their instances.
+pub(crate) fn gathered(draw: &Draw, members: &[Member]) -> (SceneBuffers, Vec<OracleInstance>) {
+    let scene = &draw.scene;
+    let triples = (scene.degree + 1).pow(2) as usize;
+    let stored = |value: f32| {
+        if draw.half {
+            f16::from_f32(value).to_f32()
+        } else {
+            value
+        }
+    };
+    let mut all = SceneBuffers {
+        degree: scene.degree,
+        ..SceneBuffers::default()
+    };
+    let mut instances = Vec::new();
+    for &[vertex, instance] in members {
+        let at = vertex as usize;
+        all.positions.push(scene.positions[at].map(stored));
+        all.scales.push(scene.scales[at].map(stored));
+        all.rotations.push(scene.rotations[at].map(stored));
+        all.opacities.push(stored(scene.opacities[at]));
+        let coefficients = &scene.sh[at * triples..][..triples];
+        all.sh
+            .extend(coefficients.iter().map(|triple| triple.map(stored)));
+        if let Some((rate, placed)) = &draw.instances {
+            let which = match *rate {
+                vk::VertexInputRate::INSTANCE => instance,
+                _ => vertex,
+            };
+            instances.push(placed[which as usize]);
+        }
+    }
+    (all, instances)
+}
+
+/// What a colour attachment makes of a colour, up to rounding.
+fn stored_color(draw: &Draw, color: [f64; 4]) -> [f64; 4] {
+    match draw.format {
+        ColorFormat::Unorm8 => color.map(|component| component.clamp(0.0, 1.0)),
+        _ => color,
+    }
+}
+
+/// Lays a set's fragments over what the attachment holds.
+fn blend(draw: &Draw, held: &mut Reference, drawn: &Reference) {
+    let viewport = draw.viewport();
+    let left = viewport.x as i64;
+    let top = (viewport.y + viewport.height.min(0.0)) as i64;
+    let inside = |rectangle: Option<vk::Rect2D>, [x, y]: [i64; 2]| {
+        rectangle.is_none_or(|vk::Rect2D { offset, extent }| {
+            let [right, bottom] = [
+                i64::from(offset.x) + i64::from(extent.width),
+                i64::from(offset.y) + i64::from(extent.height),
+            ];
+            (i64::from(offset.x)..right).contains(&x) && (i64::from(offset.y)..bottom).contains(&y)
+        })
+    };
+    let samples = (1_u64 << draw.samples) - 1;
+    let written = (u64::from(draw.sample_mask) & samples).count_ones();
+    let share = f64::from(written) / f64::from(draw.samples);
+    for at in 0..held.nominal.len() {
+        let place = [at as u32 % held.width, at as u32 / held.width].map(i64::from);
+        let own = [place[0] - left, place[1] - top];
+        let within = (0..i64::from(drawn.width)).contains(&own[0])
+            && (0..i64::from(drawn.height)).contains(&own[1]);
+        if !within || !inside(draw.scissor, place) || !inside(draw.area, place) {
+            continue;
+        }
+        let source = (own[1] * i64::from(drawn.width) + own[0]) as usize;
+        let mut outcomes = Vec::new();
+        for &behind in held.outcomes(at) {
+            for fragment in drawn.outcomes(source) {
+                let after = blended(draw, *fragment, behind);
+                let mix = |c: usize| share * after[c] + (1.0 - share) * behind[c];
+                outcomes.push([0, 1, 2, 3].map(mix));
+            }
+        }
+        held.nominal[at] = outcomes.remove(0);
+        if outcomes.is_empty() {
+            held.alternatives.remove(&at);
+        } else {
+            held.alternatives.insert(at, outcomes);
+        }
+    }
+    held.exhausted += drawn.exhausted;
+}
+
+/// One fragment, if there is one, and what is behind it.
+fn blended(draw: &Draw, fragment: [f64; 4], behind: [f64; 4]) -> [f64; 4] {
+    // Every Gaussian that contributes leaves less light.
+    if fragment[3] <= 0.0 {
+        return behind;
+    }
+    let fragment = stored_color(draw, fragment);
+    let [source, destination] = match draw.blend {
+        Blend::Over => [1.0, 1.0 - fragment[3]],
+        Blend::Add => [1.0, 1.0],
+        Blend::Under => [1.0 - behind[3], 1.0],
+        Blend::Replace => [1.0, 0.0],
+    };
+    let mask = draw.write_mask.as_raw();
+    let component = |c: usize| {
+        if mask >> c & 1 == 1 {
+            source * fragment[c] + destination * behind[c]
+        } else {
+            behind[c]
+        }
+    };
+    stored_color(draw, [0, 1, 2, 3].map(component))
+}
+
+impl Expected {
+    /// The verdict on a picture's colours.
+    pub fn verdict(&self, picture: &Picture) -> Verdict {
+        let limits = Limits {
+            distance: self.distance,
+            ..Limits::ENVELOPE_ONLY
+        };
+        verdict(&picture.color, &self.color, limits)
+    }
+
+    /// What is wrong with a picture, if anything is.
+    pub fn fault(&self, picture: &Picture) -> Option<String> {
+        let verdict = self.verdict(picture);
+        if !verdict.holds() {
+            return Some(format!("colours: {verdict}"));
+        }
+        let place = |at: usize| {
+            [
+                at % self.color.width as usize,
+                at / self.color.width as usize,
+            ]
+        };
+        for (at, (allowed, code)) in self.depth.iter().zip(&picture.stored.depth).enumerate() {
+            if allowed
+                .as_ref()
+                .is_some_and(|allowed| !allowed.contains(code))
+            {
+                let place = place(at);
+                return Some(format!(
+                    "depths: {code:#x} at {place:?}, not one of {allowed:x?}"
+                ));
+            }
+        }
+        for (at, (allowed, stencil)) in self.stencil.iter().zip(&picture.stored.stencil).enumerate()
+        {
+            if !allowed.contains(stencil) {
+                let place = place(at);
+                return Some(format!(
+                    "stencils: {stencil} at {place:?}, not one of {allowed:?}"
+                ));
+            }
+        }
+        None
+    }
+}

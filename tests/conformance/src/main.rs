@@ -1,0 +1,140 @@
+//! `gaurast-conformance`: holds an implementation of the Gaussian primitive against the extension's text.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Instant;
+
+use clap::Parser;
+use gaurast_conformance::report::{Counts, Result, junit};
+use gaurast_conformance::{Case, Implementation, Outcome, all, cases, open};
+
+/// Runs the conformance cases of VK_GAURAST_gaussian_primitive_topology on a driver.
+///
+/// Ends with 0 if no case fails, 1 if one does, and 2 if there is nothing to test.
+#[derive(Debug, Parser)]
+#[command(name = "gaurast-conformance", version)]
+struct Arguments {
+    /// `embedded`; a manifest for the Vulkan loader (ICD.json); `second`, the second implementation; `loader`, its first device that draws Gaussians; or a part of
+    /// such a device's name
+    #[arg(long, value_name = "NAME|ICD.json", default_value = "embedded")]
+    driver: String,
+    /// Lists the cases and runs none
+    #[arg(long)]
+    list: bool,
+    /// Runs the cases that have PATTERN in their name (`*` stands for anything); may be given more than once
+    #[arg(long, value_name = "PATTERN")]
+    case: Vec<String>,
+    /// Writes the results as JUnit's XML
+    #[arg(long, value_name = "FILE")]
+    junit: Option<PathBuf>,
+    /// Where pictures of failures are written: expected, drawn, and the distance from the envelope
+    #[arg(long, value_name = "FOLDER", default_value = "conformance-failures")]
+    pictures: PathBuf,
+    /// Prints every case, not only failures
+    #[arg(long, short)]
+    verbose: bool,
+    /// Has the embedded device make each of its mistakes, and tells which cases catch it
+    #[cfg(feature = "mistakes")]
+    #[arg(long)]
+    mistakes: bool,
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let mut cases = all();
+    if !arguments.case.is_empty() {
+        cases.retain(|case| {
+            arguments
+                .case
+                .iter()
+                .any(|pattern| cases::fits(&case.path(), pattern))
+        });
+    }
+    if arguments.list {
+        for case in &cases {
+            println!("{}", case.path());
+        }
+        return ExitCode::SUCCESS;
+    }
+    let device = match open(&arguments.driver) {
+        Ok(device) => device,
+        Err(error) => {
+            eprintln!("{}: {}", arguments.driver, error.0);
+            return ExitCode::from(2);
+        }
+    };
+    #[cfg(feature = "mistakes")]
+    if arguments.mistakes {
+        return gaurast_conformance::mistakes::prove(&*device, &cases);
+    }
+    println!("{} cases on {}", cases.len(), device.name());
+    let results: Vec<Result> = cases
+        .iter()
+        .map(|case| run(&*device, case, &arguments))
+        .collect();
+    for chapter in cases::chapters() {
+        let own: Vec<&Result> = results
+            .iter()
+            .filter(|result| result.chapter == chapter)
+            .collect();
+        let counts = Counts::of(own.iter().copied());
+        if counts.all() > 0 {
+            let seconds: f64 = own.iter().map(|result| result.time.as_secs_f64()).sum();
+            println!("{chapter:15} {}  {seconds:6.1} s", line(counts));
+        }
+    }
+    let counts = Counts::of(&results);
+    println!("{:15} {}", "all", line(counts));
+    if let Some(path) = &arguments.junit
+        && let Err(error) = std::fs::write(path, junit(device.name(), &results))
+    {
+        eprintln!("{}: {error}", path.display());
+        return ExitCode::from(2);
+    }
+    if counts.failed > 0 {
+        ExitCode::FAILURE
+    } else {
+        ExitCode::SUCCESS
+    }
+}
+
+fn line(counts: Counts) -> String {
+    let Counts {
+        passed,
+        failed,
+        not_supported,
+    } = counts;
+    format!("{passed:4} Pass {failed:4} Fail {not_supported:4} NotSupported")
+}
+
+/// Runs a case, and prints what came of it.
+fn run(device: &dyn Implementation, case: &Case, arguments: &Arguments) -> Result {
+    let start = Instant::now();
+    let outcome = case.run(device);
+    let time = start.elapsed();
+    match &outcome {
+        Outcome::Pass(distance) if arguments.verbose => {
+            println!(
+                "Pass          {}  ({distance:.1e} from the envelope)",
+                case.path()
+            );
+        }
+        Outcome::NotSupported(what) if arguments.verbose => {
+            println!("NotSupported  {}  ({what})", case.path());
+        }
+        Outcome::Fail(failure) => {
+            println!("Fail          {}\n    {}", case.path(), failure.message);
+            let picture: &Path = &arguments.pictures.join(format!("{}.png", case.path()));
+            if failure.write(picture) {
+                println!("    {}", picture.display());
+            }
+        }
+        _ => {}
+    }
+    Result {
+        chapter: case.chapter,
+        name: case.name.clone(),
+        outcome,
+        time,
+    }
+}

@@ -1,0 +1,32 @@
+//! The conformance cases on this driver: those of the program `gaurast-conformance`, a test for each chapter.
+
+use gaurast_conformance::{Outcome, all, cases, open};
+use gaurast_runner::{Case, Variant};
+use gaurast_tests::contexts::{Settings, with_settings};
+
+fn chapters() -> Vec<Variant> {
+    cases::chapters().map(Variant::new).collect()
+}
+
+#[gaurast_runner::test(each = chapters())]
+fn every_case_passes(case: &Case) {
+    let device = with_settings(&Settings::default(), || open("embedded"));
+    let device = device.expect("a device");
+    let (mut failures, mut passed, mut not_supported) = (Vec::new(), 0, 0);
+    for one in all() {
+        if one.chapter != case.variant() {
+            continue;
+        }
+        match one.run(&*device) {
+            Outcome::Pass(_) => passed += 1,
+            Outcome::NotSupported(_) => not_supported += 1,
+            Outcome::Fail(failure) => failures.push(format!("{}: {}", one.path(), failure.message)),
+        }
+    }
+    assert!(failures.is_empty(), "{failures:#?}");
+    // This driver lacks no more than a sample count.
+    assert!(
+        passed > 10 * not_supported,
+        "{passed} passed, {not_supported} are not supported"
+    );
+}
