@@ -62,12 +62,6 @@ impl PackedSpan {
     pub(super) fn from_bits(bits: u32) -> Self {
         Self(bits)
     }
-
-    /// Whether it has no tile.
-    #[inline(always)]
-    pub(crate) fn is_empty(self) -> bool {
-        (self.0 & 0xFFFF) >= self.0 >> 16
-    }
 }
 
 impl TileFootprint {

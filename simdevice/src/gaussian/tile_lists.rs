@@ -127,18 +127,29 @@ struct Rows {
 /// Tiles that follow one another in a row, and a primitive that reaches them.
 #[derive(Clone, Copy, Debug, Default)]
 struct TileRun {
-    /// The number of the row's first tile in its band.
-    row_start: u32,
-    span: PackedSpan,
+    /// The number of its first tile in the band.
+    first: u32,
+    /// The number after that of its last.
+    end: u32,
     primitive: u32,
 }
 
 impl TileRun {
+    /// Those of a span in the row whose first tile has number `row_start` in the band.
+    #[inline(always)]
+    fn new(row_start: u32, span: PackedSpan, primitive: u32) -> Self {
+        let TileSpan { first, end } = span.into();
+        Self {
+            first: row_start.wrapping_add(first.into()),
+            end: row_start.wrapping_add(end.into()),
+            primitive,
+        }
+    }
+
     /// The number of its first tile in the band, and that after its last.
     #[inline(always)]
     fn tiles(self) -> [usize; 2] {
-        let TileSpan { first, end } = self.span.into();
-        [first, end].map(|column| self.row_start as usize + usize::from(column))
+        [self.first as usize, self.end as usize]
     }
 }
 
@@ -305,37 +316,37 @@ impl Rows {
             let (group, place) = locate(primitive);
             &groups.reaches[group][place]
         };
-        let mut ahead = part.chunks(GATHERED).skip(1);
-        for some in part.chunks(GATHERED) {
-            // They lie anywhere, so that each would be waited for.
-            for next in ahead.next().unwrap_or_default() {
-                devmem::prefetch(std::slice::from_ref(reach_of(next)));
+        let Some(first) = part.first() else {
+            return Some(runs);
+        };
+        let is_one_band = bands == 1;
+        let mut ahead = [reach_of(first); GATHERED];
+        let mut next = part.chunks(GATHERED);
+        // They lie anywhere, so that each would be waited for.
+        let mut fetch = |ahead: &mut [_; GATHERED]| {
+            for (reach, named) in ahead.iter_mut().zip(next.next().unwrap_or_default()) {
+                *reach = reach_of(named);
+                devmem::prefetch(std::slice::from_ref(*reach));
             }
+        };
+        fetch(&mut ahead);
+        for some in part.chunks(GATHERED) {
+            let reaches = ahead;
+            fetch(&mut ahead);
             let before = written(&runs);
-            for named in some {
-                let (reach, &(_, primitive)) = (reach_of(named), named);
+            for (&(_, primitive), reach) in some.iter().zip(reaches) {
                 if let Some((row, spans)) = reach.held() {
                     let (band, row_start) = place(row);
-                    let (last_band, _) = place(row + HELD_ROWS as u32 - 1);
-                    let run = TileRun {
-                        row_start,
-                        span: PackedSpan::default(),
-                        primitive,
-                    };
-                    if band == last_band {
-                        runs[band as usize].push_rows(run, spans, self.columns);
+                    if is_one_band || band == place(row + HELD_ROWS as u32 - 1).0 {
+                        let runs = &mut runs[band as usize];
+                        runs.push_rows(row_start, spans, self.columns, primitive);
                         continue;
                     }
                 }
                 let others = groups.spans[locate(primitive).0];
                 for (row, span) in reach.spans(others).filter(|(_, span)| span.len() > 0) {
                     let (band, row_start) = place(row);
-                    let span = span.into();
-                    runs[band as usize].push(TileRun {
-                        row_start,
-                        span,
-                        primitive,
-                    });
+                    runs[band as usize].push(TileRun::new(row_start, span.into(), primitive));
                 }
             }
             if !allow((written(&runs) - before) as u64) {
@@ -360,20 +371,27 @@ impl TileRuns {
         }
     }
 
-    /// Adds a run for each of some rows that has tiles: `first` is the first row's, but for its span, and a row has so many
-    /// `columns`.
+    /// Adds a run of `primitive` for each of some rows that has tiles: the first tile of the first row has number `row_start`,
+    /// and a row has so many `columns`.
     #[inline(always)]
-    fn push_rows(&mut self, first: TileRun, spans: [PackedSpan; HELD_ROWS], columns: u32) {
+    fn push_rows(
+        &mut self,
+        mut row_start: u32,
+        spans: [PackedSpan; HELD_ROWS],
+        columns: u32,
+        primitive: u32,
+    ) {
         if self.runs.len() < self.len + HELD_ROWS {
             self.grow();
         }
         let room = &mut self.runs[self.len..self.len + HELD_ROWS];
-        let (mut run, mut len) = (first, 0);
+        let mut len = 0;
         for span in spans {
+            let run = TileRun::new(row_start, span, primitive);
             // What has no tiles is written over.
-            room[len] = TileRun { span, ..run };
-            len += usize::from(!span.is_empty());
-            run.row_start = run.row_start.wrapping_add(columns);
+            room[len] = run;
+            len += usize::from(run.first < run.end);
+            row_start = row_start.wrapping_add(columns);
         }
         self.len += len;
     }

@@ -4,7 +4,7 @@ use super::accumulator::Accumulator;
 use super::depth_ranges::DepthRanges;
 use super::grid::{BLOCKS, BlockMiddles, ROUND};
 use super::inputs::{Kernel, NO_DEPTH, TileCounts, TileInputs};
-use super::staging::StagedSplat;
+use super::staging::reached_blocks;
 use crate::gaussian::splat::{Splat, binary16_headroom, locate};
 use crate::stats::optimizations::Optimization;
 use crate::stats::recorder;
@@ -93,7 +93,6 @@ pub(super) fn part<S: Simd>(
     for list in &mut *lists {
         list.clear();
     }
-    let mut record = StagedSplat::default();
     let middles = BlockMiddles::new(task.corner);
     let (mut hidden_alone, recorded) = (0, runs.is_some());
     for &primitive in task.list {
@@ -116,7 +115,7 @@ pub(super) fn part<S: Simd>(
             _ if !bounded => all,
             Some(surfel) => mask32x16::from_bitmask(simd, surfel.blocks(task.corner)),
             None if splat.needs_f64 => all,
-            None => record.place(simd, splat, &middles, most_fall),
+            None => reached_blocks(simd, splat, &middles, most_fall),
         };
         if hidden {
             hidden_alone += reached.to_bitmask().count_ones();

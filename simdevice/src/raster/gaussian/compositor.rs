@@ -1,8 +1,8 @@
 //! Gaussian mode of the tile engine: front to back through a tile's list, with early termination.
 //!
 //! Most trained Gaussians are a few pixels wide, so a tile is taken as 16 blocks of 4x4 pixels, and lists are
-//! worked off in three phases, a round at a time. Phase 1 ([`staging`]) tests one Gaussian against all 16 blocks in one vector,
-//! conservatively, and sets its bit in the words of those that it may reach. Phase 2 ([`pixels`]) finds the alphas of all
+//! worked off in three phases, a round at a time. Phase 1 ([`staging`]) tests a vector of Gaussians against each of the 16 blocks,
+//! conservatively, and sets their bits in the words of those that they may reach. Phase 2 ([`pixels`]) finds the alphas of all
 //! that are reached, and phase 3 takes the blocks in turn, each with its 16 pixels in registers, through their alphas.
 //!
 //! Exponents are formed from the block's middle: the Cholesky factor times its offset from the mean is computed in

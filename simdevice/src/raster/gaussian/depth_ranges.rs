@@ -4,7 +4,7 @@
 //! stored depth are those from one more to one less. So one subtraction and one comparison do for every operation, and
 //! nothing in the kernel depends on which it is.
 
-use super::grid::{BLOCK_PIXELS, BLOCKS, PixelMask};
+use super::grid::{BLOCK_PIXELS, BLOCKS, PixelMask, ROUND};
 use crate::gaussian::depth::DepthTrend;
 use crate::state::CompareOp;
 use fearless_simd::{Simd, mask32x16, prelude::*, u32x16};
@@ -115,6 +115,20 @@ impl DepthRanges {
         let least = u32x16::simd_from(simd, self.least);
         let greatest = u32x16::simd_from(simd, self.greatest);
         depth.simd_ge(least) & depth.simd_le(greatest)
+    }
+
+    /// Which of a round's depths may pass in a block: a bit for each.
+    #[inline(always)]
+    pub(super) fn shown<S: Simd>(&self, simd: S, block: usize, depths: &[u32; ROUND]) -> u32 {
+        let least = S::u32s::splat(simd, self.least[block]);
+        let greatest = S::u32s::splat(simd, self.greatest[block]);
+        let mut shown = 0;
+        for first in (0..ROUND).step_by(S::u32s::LEN) {
+            let depth = S::u32s::from_slice(simd, &depths[first..first + S::u32s::LEN]);
+            let bits = depth.simd_ge(least).to_bitmask() & depth.simd_le(greatest).to_bitmask();
+            shown |= (bits as u32) << first;
+        }
+        shown
     }
 
     /// The pixels of a block where a depth passes.

@@ -11,6 +11,7 @@ use super::grid::{ALL_BLOCKS, BLOCKS, ROUND};
 use super::inputs::{DepthMode, NO_DEPTH, TileCounts, TileInputs};
 use super::pixels::{Alphas, evaluate, evaluate_steep};
 use super::staging::{Reaching, StagedRound, hidden_blocks};
+use crate::gaussian::splat::Splat;
 use crate::stats::optimizations::Optimization;
 use crate::stats::recorder;
 use crate::stats::recorder::Run;
@@ -37,7 +38,7 @@ struct Open {
 
 /// Gaussians that are composited together.
 struct Round<'a> {
-    primitives: &'a [u32],
+    splats: &'a [&'a Splat],
     /// Those of the round after.
     next: &'a [u32],
     open: Open,
@@ -57,10 +58,16 @@ pub(super) fn composite<S: Simd, const DEPTH: DepthMode>(
     for block in 0..BLOCKS {
         accumulator.find_most_fall(simd, block, task.thresholds.most_fall);
     }
-    for primitive in task.list.iter().take(ROUND) {
-        task.prefetch(Some(primitive));
+    let Some(&first) = task.list.first() else {
+        return work;
+    };
+    let mut ahead = [task.splat(first); ROUND];
+    for (splat, &primitive) in ahead.iter_mut().zip(task.list) {
+        *splat = task.prefetched(primitive);
     }
     for (number, primitives) in task.list.chunks(ROUND).enumerate() {
+        let round = ahead;
+        let splats = &round[..primitives.len().min(ROUND)];
         let rest = &task.list[number * ROUND..];
         let bits = open_blocks::<_, DEPTH>(simd, task, accumulator, rest, &mut work);
         if bits == 0 {
@@ -75,7 +82,7 @@ pub(super) fn composite<S: Simd, const DEPTH: DepthMode>(
                 0
             },
         };
-        if DEPTH > NO_DEPTH && ranges.rejects_rest(task.splat(primitives[0]).depth, task.trend) {
+        if DEPTH > NO_DEPTH && ranges.rejects_rest(splats[0].depth, task.trend) {
             work.tiles_hidden += rest.len() as u64;
             if let Some(runs) = &mut runs {
                 work.hidden_rest = rest.len() as u32;
@@ -86,7 +93,7 @@ pub(super) fn composite<S: Simd, const DEPTH: DepthMode>(
         let next = rest.get(ROUND..).unwrap_or_default();
         let before = work;
         let round = Round {
-            primitives,
+            splats,
             next,
             open,
             is_recorded: runs.is_some(),
@@ -96,12 +103,12 @@ pub(super) fn composite<S: Simd, const DEPTH: DepthMode>(
             simd,
             task,
             (&mut *accumulator, ranges),
-            &round,
+            (&round, &mut ahead),
             &mut work,
         );
         if let Some(runs) = &mut runs {
             let run = Run {
-                primitives: primitives.len() as u32,
+                primitives: splats.len() as u32,
                 rows: open.rows,
                 blocks: open.blocks,
                 reached: (work.items - before.items) as u32,
@@ -143,14 +150,14 @@ fn open_blocks<S: Simd, const DEPTH: DepthMode>(
     open
 }
 
-/// Composites a round. Returns how many blocks those would reach that depths hide in all of the tile, if work is recorded.
+/// Composites a round, and brings the next one's splats `ahead`. Returns how many blocks those would reach that depths hide in all of the tile, if work is recorded.
 #[inline(always)]
-fn composite_round<S: Simd, const DEPTH: DepthMode>(
+fn composite_round<'a, S: Simd, const DEPTH: DepthMode>(
     scratch: &mut FastScratch,
     simd: S,
-    task: &TileInputs<'_>,
+    task: &TileInputs<'a>,
     (accumulator, ranges): (&mut Accumulator, &DepthRanges),
-    round: &Round<'_>,
+    (round, ahead): (&Round<'_>, &mut [&'a Splat; ROUND]),
     work: &mut TileCounts,
 ) -> u32 {
     let (open, blocks) = (round.open.bits, u64::from(round.open.blocks));
@@ -159,7 +166,8 @@ fn composite_round<S: Simd, const DEPTH: DepthMode>(
         let placed = scratch.staged.place::<_, DEPTH>(
             simd,
             task,
-            (round.primitives, from, round.next),
+            (round.splats, from),
+            (round.next, &mut *ahead),
             (open, ranges),
             round.is_recorded,
         );
@@ -167,7 +175,7 @@ fn composite_round<S: Simd, const DEPTH: DepthMode>(
         work.tiles_hidden += placed.tiles_hidden;
         work.blocks_hidden += placed.blocks_hidden;
         blocks_of_hidden += placed.blocks_of_hidden;
-        let Some(&primitive) = round.primitives.get(placed.end) else {
+        let Some(&splat) = round.splats.get(placed.end) else {
             break placed.reaching;
         };
         // It is steep; what is before it is composited first.
@@ -181,7 +189,6 @@ fn composite_round<S: Simd, const DEPTH: DepthMode>(
             ranges,
             task.thresholds,
         );
-        let splat = task.splat(primitive);
         let shown = if DEPTH <= NO_DEPTH {
             open
         } else {
@@ -195,7 +202,7 @@ fn composite_round<S: Simd, const DEPTH: DepthMode>(
             evaluate_steep::<_, DEPTH>(accumulator, simd, splat, shown, ranges, task);
         from = placed.end + 1;
     };
-    work.pairs += round.primitives.len() as u64;
+    work.pairs += round.splats.len() as u64;
     work.items += count_bits(&reaching);
     let staged = (&scratch.staged, &mut *scratch.alphas);
     work.contributions += evaluate::<_, DEPTH>(

@@ -214,19 +214,19 @@ pub(super) struct TileInputs<'a> {
     pub(super) way: Approximation,
 }
 
-impl TileInputs<'_> {
+impl<'a> TileInputs<'a> {
     #[inline(always)]
-    pub(super) fn splat(&self, primitive: u32) -> &Splat {
+    pub(super) fn splat(&self, primitive: u32) -> &'a Splat {
         let (batch, place) = locate(primitive);
         &self.splats[batch][place]
     }
 
-    /// Has a primitive's splat on its way.
+    /// A primitive's splat, which is on its way.
     #[inline(always)]
-    pub(super) fn prefetch(&self, primitive: Option<&u32>) {
-        if let Some(&primitive) = primitive {
-            devmem::prefetch(slice::from_ref(self.splat(primitive)));
-        }
+    pub(super) fn prefetched(&self, primitive: u32) -> &'a Splat {
+        let splat = self.splat(primitive);
+        devmem::prefetch(slice::from_ref(splat));
+        splat
     }
 }
 

@@ -84,7 +84,7 @@ impl Alphas {
                     for to in alphas {
                         let number = rest.trailing_zeros() as usize % ROUND;
                         rest &= rest.wrapping_sub(1);
-                        let fall = round.records[number].falls(simd, block);
+                        let fall = round.falls(simd, number, block);
                         let at = (block, round.looks[number].depth);
                         let reached = reached(simd, DEPTH, at, fall, ranges, most_fall);
                         pixels.add(reached);

@@ -5,7 +5,7 @@ use super::grid::{BLOCK_PIXELS, BLOCKS, BLOCKS_ACROSS, BlockMiddles, HALF, LANE_
 use super::inputs::{DepthMode, NO_DEPTH, TileInputs};
 use crate::gaussian::splat::Splat;
 use crate::stats::optimizations::Optimization;
-use fearless_simd::{Simd, f32x8, f32x16, f64x4, i32x8, i32x16, mask32x16, prelude::*, u32x16};
+use fearless_simd::{Simd, f32x8, f32x16, f64x4, mask32x16, prelude::*};
 
 /// What rounding may do to exponents, relative to them.
 const ROOM_FACTOR: f32 = 1.0 + 1e-5;
@@ -15,22 +15,37 @@ pub(super) type Reaching = [u32; BLOCKS];
 
 /// A round's Gaussians in a tile.
 #[derive(Debug, Default)]
+#[repr(align(64))]
 pub(super) struct StagedRound {
-    pub(super) records: [StagedSplat; ROUND],
+    /// `u` at the middle of each column of blocks, by column and then by Gaussian.
+    u: [[f32; ROUND]; BLOCKS_ACROSS],
+    /// `v` at the middle of each block, by block and then by Gaussian.
+    v: [[f32; ROUND]; BLOCKS],
+    gathered: Gathered,
+    records: [StagedSplat; ROUND],
     pub(super) looks: [SplatColor; ROUND],
 }
 
-/// What it takes to find alphas.
+/// What several Gaussians are placed by at a time: by element, and then by Gaussian.
+#[derive(Debug, Default)]
+struct Gathered {
+    mean: [[f64; ROUND]; 2],
+    factor: [[f64; ROUND]; 3],
+    /// The factor, rounded.
+    narrow: [[f32; ROUND]; 3],
+    log2_opacity: [f32; ROUND],
+    depth: [u32; ROUND],
+}
+
+/// What it takes to find alphas, but for `v` at the middles of blocks.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C, align(64))]
-pub(super) struct StagedSplat {
+struct StagedSplat {
     /// By column of blocks, `u^2` less the logarithm of the opacity at the pixels of two rows: both pairs of a block's rows
     /// have the same.
-    pub(super) from_u: [[f32; BLOCK_PIXELS / 2]; BLOCKS_ACROSS],
-    /// `v` at the middle of each block.
-    pub(super) v: [f32; BLOCKS],
-    /// What a pixel's offset from the middle of its block adds to that.
-    pub(super) along: [f32; BLOCK_PIXELS],
+    from_u: [[f32; BLOCK_PIXELS / 2]; BLOCKS_ACROSS],
+    /// What a pixel's offset from the middle of its block adds to `v` there.
+    along: [f32; BLOCK_PIXELS],
 }
 
 /// What it takes to composite.
@@ -59,13 +74,14 @@ pub(super) struct Placed {
 
 impl StagedRound {
     /// Places the Gaussians of a tile's round from number `from` on, before one that is steep, and has as many of the next round
-    /// on their way. `open` are the blocks that are not finished.
+    /// on their way, which are then `ahead`. `open` are the blocks that are not finished.
     #[inline(never)]
-    pub(super) fn place<S: Simd, const DEPTH: DepthMode>(
+    pub(super) fn place<'a, S: Simd, const DEPTH: DepthMode>(
         &mut self,
         simd: S,
-        task: &TileInputs<'_>,
-        (round, from, next): (&[u32], usize, &[u32]),
+        task: &TileInputs<'a>,
+        (round, from): (&[&Splat], usize),
+        (next, ahead): (&[u32], &mut [&'a Splat; ROUND]),
         (open, ranges): (u64, &DepthRanges),
         is_recorded: bool,
     ) -> Placed {
@@ -73,22 +89,14 @@ impl StagedRound {
             #[inline(always)]
             || {
                 let mut placed = Placed::default();
-                let middles = BlockMiddles::new(task.corner);
-                let most_fall = task.thresholds.most_fall;
-                let bounded = task.optimizations.has(Optimization::Blocks);
-                // Masks are not combined here: that would be calls.
                 let open_mask = mask32x16::from_bitmask(simd, open);
-                let open = open_mask.to_vector();
-                let (mut reaching, all) = (i32x16::splat(simd, 0), i32x16::splat(simd, -1));
-                let mut number = from;
-                // The Gaussian's bit in words; the first one's comes back after the last one's.
-                let mut bit = i32x8::splat(simd, 1 << (from % ROUND));
-                while let Some(&primitive) = round.get(number) {
-                    task.prefetch(next.get(number));
-                    let splat = task.splat(primitive);
+                let (mut present, mut number) = (0u32, from);
+                while let Some(&splat) = round.get(number) {
+                    if let Some(&primitive) = next.get(number) {
+                        ahead[number % ROUND] = task.prefetched(primitive);
+                    }
                     if DEPTH > NO_DEPTH && ranges.hides(splat.depth) {
                         number += 1;
-                        bit += bit;
                         placed.tiles_hidden += 1;
                         if is_recorded {
                             placed.blocks_of_hidden += hidden_blocks(simd, splat, task, open_mask);
@@ -98,83 +106,216 @@ impl StagedRound {
                     if splat.needs_f64 {
                         break;
                     }
-                    let at = number % ROUND;
+                    self.gather(number % ROUND, splat);
+                    present |= 1 << (number % ROUND);
                     number += 1;
-                    let reached = self.records[at].place(simd, splat, &middles, most_fall);
-                    self.looks[at] = SplatColor {
-                        color: splat.color,
-                        depth: splat.depth,
-                    };
-                    placed.count += 1;
-                    let mut reached = if bounded { reached.to_vector() } else { all };
-                    if DEPTH > NO_DEPTH {
-                        reached &= open;
-                        let shown = ranges.blocks(simd, splat.depth).to_vector();
-                        let hidden = (reached & (shown ^ -1)).simd_lt(0).to_bitmask();
-                        placed.blocks_hidden += u64::from(hidden.count_ones());
-                        reached &= shown;
-                    }
-                    reaching |= reached & bit.combine(bit);
-                    bit += bit;
                 }
                 placed.end = number;
-                placed.reaching = (reaching & open).bitcast::<u32x16<S>>().to_array();
+                placed.count = present.count_ones().into();
+                let bounded = task.optimizations.has(Optimization::Blocks);
+                let middles = BlockMiddles::new(task.corner);
+                let mut reaching = [0; BLOCKS];
+                for first in (from / S::f32s::LEN * S::f32s::LEN..number).step_by(S::f32s::LEN) {
+                    let most_fall = task.thresholds.most_fall;
+                    self.find_blocks(simd, first, &middles, most_fall, &mut reaching);
+                }
+                for number in from..number {
+                    self.record(simd, number % ROUND);
+                }
+                for (block, reaching) in reaching.iter_mut().enumerate() {
+                    let is_open = open >> block & 1 == 1;
+                    let all = if bounded { *reaching } else { u32::MAX };
+                    *reaching = if is_open { all & present } else { 0 };
+                    if DEPTH > NO_DEPTH && *reaching != 0 {
+                        let shown = ranges.shown(simd, block, &self.gathered.depth);
+                        placed.blocks_hidden += u64::from((*reaching & !shown).count_ones());
+                        *reaching &= shown;
+                    }
+                }
+                placed.reaching = reaching;
                 placed
             },
         )
     }
-}
 
-impl StagedSplat {
-    /// Makes this the record of `splat` in a tile. Returns which blocks it may reach.
+    /// Makes `splat` the round's Gaussian `number`.
     #[inline(always)]
-    pub(super) fn place<S: Simd>(
-        &mut self,
-        simd: S,
-        splat: &Splat,
-        middles: &BlockMiddles,
-        most_fall: f32,
-    ) -> mask32x16<S> {
-        let [a, b, c] = splat.factor;
-        // In each column of blocks, and each row.
-        let dx = f64x4::from_slice(simd, &middles.x) - splat.mean[0];
-        let dy = f64x4::from_slice(simd, &middles.y) - splat.mean[1];
-        let (u, sheared, sunk) = (dx * a, dx * b, dy * c);
-        let row = |row: usize| sheared + f64x4::splat(simd, sunk[row]);
-        let u: f32x8<S> = u.narrow(u);
-        let upper: f32x8<S> = row(0).narrow(row(1));
-        let lower: f32x8<S> = row(2).narrow(row(3));
-        let v = upper.combine(lower);
-        v.store_slice(&mut self.v);
-        let [a, b, c] = [a as f32, b as f32, c as f32];
+    fn gather(&mut self, number: usize, splat: &Splat) {
+        let Gathered {
+            mean,
+            factor,
+            log2_opacity,
+            depth,
+            ..
+        } = &mut self.gathered;
+        for (lanes, &part) in mean.iter_mut().zip(&splat.mean) {
+            lanes[number] = part;
+        }
+        for (lanes, &part) in factor.iter_mut().zip(&splat.factor) {
+            lanes[number] = part;
+        }
+        log2_opacity[number] = splat.log2_opacity;
+        depth[number] = splat.depth;
+        self.looks[number] = SplatColor {
+            color: splat.color,
+            depth: splat.depth,
+        };
+    }
+
+    /// Makes the record of Gaussian `number`, whose `u` is known.
+    #[inline(always)]
+    fn record<S: Simd>(&mut self, simd: S, number: usize) {
+        let Gathered {
+            narrow,
+            log2_opacity,
+            ..
+        } = &self.gathered;
+        let [a, b, c] = [narrow[0][number], narrow[1][number], narrow[2][number]];
+        let log2_opacity = f32x8::splat(simd, log2_opacity[number]);
+        let record = &mut self.records[number];
         let columns = f32x8::from_slice(simd, &LANE_X[..BLOCK_PIXELS / 2]);
         let across = columns * a;
-        let log2_opacity = f32x8::splat(simd, splat.log2_opacity);
-        for (column, from_u) in self.from_u.iter_mut().enumerate() {
-            let u = across + u[column];
+        for (from_u, u) in record.from_u.iter_mut().zip(&self.u) {
+            let u = across + u[number];
             u.mul_sub(u, log2_opacity).store_slice(from_u);
         }
         let sheared = columns * b;
         let rows = f32x16::simd_from(simd, LANE_Y);
         let along = rows.mul_add(f32x16::splat(simd, c), sheared.combine(sheared));
-        along.store_slice(&mut self.along);
+        along.store_slice(&mut record.along);
+    }
+
+    /// Finds `u` and `v` of the Gaussians from number `first` on, as many as a vector has lanes, and which blocks each may
+    /// reach.
+    #[inline(always)]
+    fn find_blocks<S: Simd>(
+        &mut self,
+        simd: S,
+        first: usize,
+        middles: &BlockMiddles,
+        most_fall: f32,
+        reaching: &mut Reaching,
+    ) {
+        let lanes = first..first + S::f32s::LEN;
+        let wide = |lanes: &[f64; ROUND]| -> Wide<S> {
+            let middle = first + S::f64s::LEN;
+            Wide(
+                S::f64s::from_slice(simd, &lanes[first..middle]),
+                S::f64s::from_slice(simd, &lanes[middle..middle + S::f64s::LEN]),
+            )
+        };
+        let Gathered {
+            mean,
+            factor,
+            narrow,
+            log2_opacity,
+            ..
+        } = &mut self.gathered;
+        let (x, y) = (wide(&mean[0]), wide(&mean[1]));
+        let (a, b, c) = (wide(&factor[0]), wide(&factor[1]), wide(&factor[2]));
+        let log2_opacity = S::f32s::from_slice(simd, &log2_opacity[lanes.clone()]);
         // How far the exponent may fall, with a margin for rounding.
-        let room = log2_opacity.mul_add(ROOM_FACTOR, most_fall * ROOM_FACTOR + 1e-3);
-        // The least |u| and |v| over a block's centres, each for itself: together they bound u^2 + v^2.
-        let least_u = (u.abs() - HALF * a.abs()).max(0.0);
-        let least_v = (v.abs() - HALF * (b.abs() + c.abs())).max(0.0);
-        let least_u = least_u * least_u;
-        let least = least_v.mul_add(least_v, least_u.combine(least_u));
-        least.simd_le(room.combine(room))
+        let room = log2_opacity.mul_add(
+            S::f32s::splat(simd, ROOM_FACTOR),
+            S::f32s::splat(simd, most_fall * ROOM_FACTOR + 1e-3),
+        );
+        let (narrow_a, narrow_b, narrow_c) = (a.narrow(), b.narrow(), c.narrow());
+        narrow_a.store_slice(&mut narrow[0][lanes.clone()]);
+        narrow_b.store_slice(&mut narrow[1][lanes.clone()]);
+        narrow_c.store_slice(&mut narrow[2][lanes.clone()]);
+        let around_u = narrow_a.abs() * HALF;
+        let around_v = (narrow_b.abs() + narrow_c.abs()) * HALF;
+        let zero = S::f32s::splat(simd, 0.0);
+        let mut sheared = [b; BLOCKS_ACROSS];
+        let mut least_u = [zero; BLOCKS_ACROSS];
+        for column in 0..BLOCKS_ACROSS {
+            let dx = x.distance_to(simd, middles.x[column]);
+            let u = dx.times(a).narrow();
+            u.store_slice(&mut self.u[column][lanes.clone()]);
+            sheared[column] = dx.times(b);
+            let least = (u.abs() - around_u).max(zero);
+            least_u[column] = least * least;
+        }
+        for row in 0..BLOCKS_ACROSS {
+            let sunk = y.distance_to(simd, middles.y[row]).times(c);
+            for column in 0..BLOCKS_ACROSS {
+                let block = row * BLOCKS_ACROSS + column;
+                let v = sheared[column].plus(sunk).narrow();
+                v.store_slice(&mut self.v[block][lanes.clone()]);
+                // The least |u| and |v| over a block's centres, each for itself: together they bound u^2 + v^2.
+                let least_v = (v.abs() - around_v).max(zero);
+                let least = least_v.mul_add(least_v, least_u[column]);
+                let may_reach = least.simd_le(room).to_bitmask() as u32;
+                reaching[block] |= may_reach << first;
+            }
+        }
     }
 
     /// How far alpha has fallen at a block's pixels: minus its base-2 logarithm.
     #[inline(always)]
-    pub(super) fn falls<S: Simd>(&self, simd: S, block: usize) -> f32x16<S> {
-        let from_u = f32x8::from_slice(simd, &self.from_u[block % BLOCKS_ACROSS]);
-        let v = f32x16::from_slice(simd, &self.along) + self.v[block];
+    pub(super) fn falls<S: Simd>(&self, simd: S, number: usize, block: usize) -> f32x16<S> {
+        let record = &self.records[number];
+        let from_u = f32x8::from_slice(simd, &record.from_u[block % BLOCKS_ACROSS]);
+        let v = f32x16::from_slice(simd, &record.along) + self.v[block][number];
         v.mul_add(v, from_u.combine(from_u))
     }
+}
+
+/// A binary64 number for each lane of a vector of binary32.
+#[derive(Clone, Copy)]
+struct Wide<S: Simd>(S::f64s, S::f64s);
+
+impl<S: Simd> Wide<S> {
+    #[inline(always)]
+    fn times(self, other: Self) -> Self {
+        Self(self.0 * other.0, self.1 * other.1)
+    }
+
+    #[inline(always)]
+    fn plus(self, other: Self) -> Self {
+        Self(self.0 + other.0, self.1 + other.1)
+    }
+
+    /// How far it is from each number to `place`.
+    #[inline(always)]
+    fn distance_to(self, simd: S, place: f64) -> Self {
+        let place = S::f64s::splat(simd, place);
+        Self(place - self.0, place - self.1)
+    }
+
+    /// Each rounded.
+    #[inline(always)]
+    fn narrow(self) -> S::f32s {
+        self.0.narrow(self.1)
+    }
+}
+
+/// The blocks of a tile that a Gaussian may reach, as [`StagedRound::place`] finds them for several at a time.
+#[inline(always)]
+pub(super) fn reached_blocks<S: Simd>(
+    simd: S,
+    splat: &Splat,
+    middles: &BlockMiddles,
+    most_fall: f32,
+) -> mask32x16<S> {
+    let [a, b, c] = splat.factor;
+    // In each column of blocks, and each row.
+    let dx = f64x4::from_slice(simd, &middles.x) - splat.mean[0];
+    let dy = f64x4::from_slice(simd, &middles.y) - splat.mean[1];
+    let (u, sheared, sunk) = (dx * a, dx * b, dy * c);
+    let row = |row: usize| sheared + f64x4::splat(simd, sunk[row]);
+    let u: f32x8<S> = u.narrow(u);
+    let upper: f32x8<S> = row(0).narrow(row(1));
+    let lower: f32x8<S> = row(2).narrow(row(3));
+    let v = upper.combine(lower);
+    let [a, b, c] = [a as f32, b as f32, c as f32];
+    let log2_opacity = f32x8::splat(simd, splat.log2_opacity);
+    let room = log2_opacity.mul_add(ROOM_FACTOR, most_fall * ROOM_FACTOR + 1e-3);
+    let least_u = (u.abs() - HALF * a.abs()).max(0.0);
+    let least_v = (v.abs() - HALF * (b.abs() + c.abs())).max(0.0);
+    let least_u = least_u * least_u;
+    let least = least_v.mul_add(least_v, least_u.combine(least_u));
+    least.simd_le(room.combine(room))
 }
 
 /// Of the `open` blocks of a tile, those that a Gaussian would be evaluated in if depths did not hide it.
@@ -189,7 +330,7 @@ pub(super) fn hidden_blocks<S: Simd>(
     let reached = if bounded {
         let most_fall = task.thresholds.most_fall;
         let middles = BlockMiddles::new(task.corner);
-        open & StagedSplat::default().place(simd, splat, &middles, most_fall)
+        open & reached_blocks(simd, splat, &middles, most_fall)
     } else {
         open
     };
