@@ -88,7 +88,7 @@ impl Device {
                 command_buffer,
                 cameras.len() as u32,
                 cameras.as_ptr(),
-            )
+            );
         }
     }
     /// Begins a sorted set: the Gaussians of all draws up to `vkCmdEndGaussianSetGAURAST` are
@@ -104,7 +104,9 @@ impl Device {
     #[inline]
     pub unsafe fn cmd_begin_gaussian_set(&self, command_buffer: vk::CommandBuffer) {
         // SAFETY: the caller keeps the function's contract; references are live.
-        unsafe { (self.fp.cmd_begin_gaussian_set_gaurast)(command_buffer) }
+        unsafe {
+            (self.fp.cmd_begin_gaussian_set_gaurast)(command_buffer);
+        }
     }
     /// Ends the sorted set that `vkCmdBeginGaussianSetGAURAST` has begun: its Gaussians are drawn
     /// here, after everything that was recorded before. It must be recorded in the subpass and in
@@ -118,7 +120,9 @@ impl Device {
     #[inline]
     pub unsafe fn cmd_end_gaussian_set(&self, command_buffer: vk::CommandBuffer) {
         // SAFETY: the caller keeps the function's contract; references are live.
-        unsafe { (self.fp.cmd_end_gaussian_set_gaurast)(command_buffer) }
+        unsafe {
+            (self.fp.cmd_end_gaussian_set_gaurast)(command_buffer);
+        }
     }
     /// Sets the order of Gaussian draws, for pipelines with
     /// [`DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST`](crate::vk::DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST).
@@ -135,7 +139,9 @@ impl Device {
         order: GaussianOrderGAURAST,
     ) {
         // SAFETY: the caller keeps the function's contract; references are live.
-        unsafe { (self.fp.cmd_set_gaussian_order_gaurast)(command_buffer, order) }
+        unsafe {
+            (self.fp.cmd_set_gaussian_order_gaurast)(command_buffer, order);
+        }
     }
     /// Sets the anti-aliasing of Gaussian draws, for pipelines with
     /// [`DYNAMIC_STATE_GAUSSIAN_ANTIALIASING_GAURAST`](crate::vk::DYNAMIC_STATE_GAUSSIAN_ANTIALIASING_GAURAST).
@@ -152,7 +158,9 @@ impl Device {
         antialiasing: GaussianAntialiasingGAURAST,
     ) {
         // SAFETY: the caller keeps the function's contract; references are live.
-        unsafe { (self.fp.cmd_set_gaussian_antialiasing_gaurast)(command_buffer, antialiasing) }
+        unsafe {
+            (self.fp.cmd_set_gaussian_antialiasing_gaurast)(command_buffer, antialiasing);
+        }
     }
     /// Sets the low-pass variance of Gaussian draws, in px^2, for pipelines with
     /// [`DYNAMIC_STATE_GAUSSIAN_LOW_PASS_VARIANCE_GAURAST`](crate::vk::DYNAMIC_STATE_GAUSSIAN_LOW_PASS_VARIANCE_GAURAST).
@@ -170,7 +178,7 @@ impl Device {
     ) {
         // SAFETY: the caller keeps the function's contract; references are live.
         unsafe {
-            (self.fp.cmd_set_gaussian_low_pass_variance_gaurast)(command_buffer, low_pass_variance)
+            (self.fp.cmd_set_gaussian_low_pass_variance_gaurast)(command_buffer, low_pass_variance);
         }
     }
     /// Sets the least alpha of Gaussian draws that contributes, for pipelines with
@@ -188,7 +196,9 @@ impl Device {
         alpha_floor: f32,
     ) {
         // SAFETY: the caller keeps the function's contract; references are live.
-        unsafe { (self.fp.cmd_set_gaussian_alpha_floor_gaurast)(command_buffer, alpha_floor) }
+        unsafe {
+            (self.fp.cmd_set_gaussian_alpha_floor_gaurast)(command_buffer, alpha_floor);
+        }
     }
     /// Sets the greatest alpha of Gaussian draws, for pipelines with
     /// [`DYNAMIC_STATE_GAUSSIAN_ALPHA_CEILING_GAURAST`](crate::vk::DYNAMIC_STATE_GAUSSIAN_ALPHA_CEILING_GAURAST).
@@ -205,7 +215,9 @@ impl Device {
         alpha_ceiling: f32,
     ) {
         // SAFETY: the caller keeps the function's contract; references are live.
-        unsafe { (self.fp.cmd_set_gaussian_alpha_ceiling_gaurast)(command_buffer, alpha_ceiling) }
+        unsafe {
+            (self.fp.cmd_set_gaussian_alpha_ceiling_gaurast)(command_buffer, alpha_ceiling);
+        }
     }
     /// Sets the transmittance below which a pixel of Gaussian draws is finished, for pipelines
     /// with
@@ -227,7 +239,7 @@ impl Device {
             (self.fp.cmd_set_gaussian_transmittance_floor_gaurast)(
                 command_buffer,
                 transmittance_floor,
-            )
+            );
         }
     }
     /// Sets the degree of spherical harmonics that Gaussian draws evaluate; at most that of the
@@ -250,7 +262,7 @@ impl Device {
             (self.fp.cmd_set_gaussian_spherical_harmonics_degree_gaurast)(
                 command_buffer,
                 spherical_harmonics_degree,
-            )
+            );
         }
     }
     /// Sets the greatest relative error of the exponential in Gaussian draws, for pipelines with
@@ -269,7 +281,7 @@ impl Device {
     ) {
         // SAFETY: the caller keeps the function's contract; references are live.
         unsafe {
-            (self.fp.cmd_set_gaussian_exponential_error_gaurast)(command_buffer, exponential_error)
+            (self.fp.cmd_set_gaussian_exponential_error_gaurast)(command_buffer, exponential_error);
         }
     }
     /// Sets the greatest sum of the contributions that Gaussian draws leave out at a pixel, for
@@ -292,7 +304,7 @@ impl Device {
             (self.fp.cmd_set_gaussian_contribution_budget_gaurast)(
                 command_buffer,
                 contribution_budget,
-            )
+            );
         }
     }
     /// Binds the buffer that the spherical harmonics of the Gaussian draws that follow are read
@@ -312,7 +324,9 @@ impl Device {
         buffer: &GaussianSphericalHarmonicsBufferGAURAST<'_>,
     ) {
         // SAFETY: the caller keeps the function's contract; references are live.
-        unsafe { (self.fp.cmd_bind_gaussian_spherical_harmonics_gaurast)(command_buffer, buffer) }
+        unsafe {
+            (self.fp.cmd_bind_gaussian_spherical_harmonics_gaurast)(command_buffer, buffer);
+        }
     }
 }
 

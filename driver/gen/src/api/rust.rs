@@ -436,7 +436,7 @@ fn add_command(calls: &mut String, comments: Comments<'_>, command: &Command) {
         #[inline]
         pub unsafe fn {method}(&self, {parameters}) {{
             // SAFETY: the caller keeps the function's contract; references are live.
-            unsafe {{ (self.fp.{field})({arguments}) }}
+            unsafe {{ (self.fp.{field})({arguments}); }}
         }}",
         documentation = comments.text(&command.comment, None).trim_end(),
         name = command.name,
