@@ -1,6 +1,6 @@
 //! The conformance cases on this driver: those of the program `gaurast-conformance`, a test for each chapter.
 
-use gaurast_conformance::{Outcome, all, cases, open};
+use gaurast_conformance::{Outcome, all, cases, open, run};
 use gaurast_runner::{Case, Variant};
 use gaurast_tests::contexts::{Settings, with_settings};
 
@@ -17,7 +17,7 @@ fn every_case_passes(case: &Case) {
         if one.chapter != case.variant() {
             continue;
         }
-        match one.run(&*device) {
+        match run(&one, &*device) {
             Outcome::Pass(_) => passed += 1,
             Outcome::NotSupported(_) => not_supported += 1,
             Outcome::Fail(failure) => failures.push(format!("{}: {}", one.path(), failure.message)),

@@ -16,7 +16,7 @@ use gaurast_oracle::scenes::SceneBuffers;
 use half::f16;
 
 use crate::draw::{Blend, Call, ColorFormat, Draw};
-use crate::record::Picture;
+use crate::implementation::Picture;
 
 /// The distance from the envelope that the extension's text allows, per unit of the greatest colour above 1.
 const CONTRACT: f64 = 5e-6;

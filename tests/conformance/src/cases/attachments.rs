@@ -6,7 +6,7 @@ use gaurast::vk::{
     PipelineGaussianStateCreateFlagsGAURAST as Flags,
 };
 
-use super::Chapter;
+use super::chapter::Chapter;
 use super::scenes::{Gaussian, ball, cameras, dense, front, layered, many};
 use crate::draw::{Blend, Call, Camera, ColorFormat, Depth, Draw, SIZE};
 
