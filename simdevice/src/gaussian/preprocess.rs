@@ -320,7 +320,7 @@ fn flatten<S: Simd>(view: &ViewConstants, simd: S, source: &Source<'_>, scratch:
 /// Quaternions, the scalar taken to be where it is not.
 #[cfg(feature = "mistakes")]
 fn mistaken_rotation(rotation: &[GroupF64; 4]) -> [GroupF64; 4] {
-    let [w, x, y, z] = rotation.clone();
+    let [w, x, y, z] = *rotation;
     if Mistake::QuaternionScalarLast.is_made() {
         [z, w, x, y]
     } else {
