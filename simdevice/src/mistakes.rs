@@ -146,8 +146,8 @@ pub(crate) fn begin(begin: &GaussianBegin) -> GaussianBegin {
 /// A key of more digits than binary32 has, or of fewer.
 pub(crate) fn key(depth: f64, key: u32) -> u32 {
     if Mistake::KeysUnrounded.is_made() && depth > 0.0 {
-        // Two more digits, for depths below 2^63.
-        (depth.to_bits() >> 27) as u32
+        // Two more digits, for depths from 2^-63 to 2^64.
+        (depth.to_bits().saturating_sub(960 << 52) >> 27) as u32
     } else if Mistake::KeysQuantised.is_made() {
         key >> 16
     } else {

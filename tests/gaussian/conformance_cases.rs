@@ -1,6 +1,6 @@
 //! The conformance cases on this driver: those of the program `gaurast-conformance`, a test for each chapter.
 
-use gaurast_conformance::{Outcome, all, cases, open};
+use gaurast_conformance::{Outcome, all, cases, open, run};
 use gaurast_runner::{Case, Variant};
 use gaurast_tests::contexts::{Settings, with_settings};
 
@@ -12,21 +12,20 @@ fn chapters() -> Vec<Variant> {
 fn every_case_passes(case: &Case) {
     let device = with_settings(&Settings::default(), || open("embedded"));
     let device = device.expect("a device");
-    let (mut failures, mut passed, mut not_supported) = (Vec::new(), 0, 0);
+    let (mut failures, mut passed) = (Vec::new(), 0);
     for one in all() {
         if one.chapter != case.variant() {
             continue;
         }
-        match one.run(&*device) {
+        match run(&one, &*device) {
             Outcome::Pass(_) => passed += 1,
-            Outcome::NotSupported(_) => not_supported += 1,
+            // This driver has one and four samples, and lacks nothing else.
+            Outcome::NotSupported(what) => {
+                assert_eq!(what, "gaussianSampleCounts", "{}", one.path());
+            }
             Outcome::Fail(failure) => failures.push(format!("{}: {}", one.path(), failure.message)),
         }
     }
     assert!(failures.is_empty(), "{failures:#?}");
-    // This driver lacks no more than a sample count.
-    assert!(
-        passed > 10 * not_supported,
-        "{passed} passed, {not_supported} are not supported"
-    );
+    assert!(passed > 0, "nothing was drawn");
 }

@@ -221,13 +221,15 @@ fn flatten<S: Simd>(view: &ViewConstants, simd: S, source: &Source<'_>, scratch:
         unscented::transform(view, by_matrices, scratch);
     }
     let moments = &*scratch.moments;
-    #[cfg(feature = "mistakes")]
-    let of_models = !Mistake::DirectionsOfWorld.is_made();
-    #[cfg(not(feature = "mistakes"))]
-    let of_models = true;
     let toward = match &scratch.placed {
-        Some(placed) if by_matrices && of_models => &placed.toward,
+        Some(placed) if by_matrices => &placed.toward,
         _ => &*scratch.offset,
+    };
+    #[cfg(feature = "mistakes")]
+    let toward = if Mistake::DirectionsOfWorld.is_made() {
+        &*scratch.offset
+    } else {
+        toward
     };
     let number = |value: f64| S::f64s::splat(simd, value);
     let load =
@@ -318,7 +320,7 @@ fn flatten<S: Simd>(view: &ViewConstants, simd: S, source: &Source<'_>, scratch:
 /// Quaternions, the scalar taken to be where it is not.
 #[cfg(feature = "mistakes")]
 fn mistaken_rotation(rotation: &[GroupF64; 4]) -> [GroupF64; 4] {
-    let [w, x, y, z] = rotation.clone();
+    let [w, x, y, z] = *rotation;
     if Mistake::QuaternionScalarLast.is_made() {
         [z, w, x, y]
     } else {

@@ -16,7 +16,7 @@ use gaurast_oracle::scenes::SceneBuffers;
 use half::f16;
 
 use crate::draw::{Blend, Call, ColorFormat, Draw};
-use crate::record::Picture;
+use crate::implementation::Picture;
 
 /// The distance from the envelope that the extension's text allows, per unit of the greatest colour above 1.
 const CONTRACT: f64 = 5e-6;
@@ -138,10 +138,43 @@ fn distance(draw: &Draw, greatest: f64, sets: usize) -> f64 {
     range * exact + approximate + stored
 }
 
+/// The pixels of a viewport, and where its corner is from theirs.
+struct Covered {
+    /// The first column and row.
+    first: [i64; 2],
+    /// Columns and rows.
+    size: [u32; 2],
+    /// The corner's place in pixels from that of the first pixel, at most half a pixel off.
+    corner: [f32; 2],
+}
+
+impl Covered {
+    /// The pixels whose centres are within the viewport.
+    fn of(viewport: &vk::Viewport) -> Self {
+        let top = viewport.y + viewport.height.min(0.0);
+        let [columns, rows] =
+            [[viewport.x, viewport.width], [top, viewport.height.abs()]].map(|[start, side]| {
+                let centre_from = |edge: f32| (edge - 0.5).ceil();
+                let first = centre_from(start);
+                (first, centre_from(start + side) - first, start - first)
+            });
+        Self {
+            first: [columns.0 as i64, rows.0 as i64],
+            size: [columns.1 as u32, rows.1 as u32],
+            corner: [columns.2, rows.2],
+        }
+    }
+}
+
+/// The camera of the pixels of the viewport. Where the viewport has fractions of pixels, that is another one unless it
+/// clamps no slope.
 fn oracle_camera(draw: &Draw) -> OracleCamera {
-    let viewport = draw.viewport();
-    let size = [viewport.width, viewport.height.abs()].map(|side| side as u32);
-    OracleCamera::new(&draw.camera, size).expect("one of the four models")
+    let covered = Covered::of(&draw.viewport());
+    let mut camera = OracleCamera::new(&draw.camera, covered.size).expect("one of the four models");
+    for (principal, corner) in camera.principal.iter_mut().zip(covered.corner) {
+        *principal += corner;
+    }
+    camera
 }
 
 fn tests(draw: &Draw) -> OracleTests {
@@ -245,9 +278,7 @@ fn stored_color(draw: &Draw, color: [f64; 4]) -> [f64; 4] {
 
 /// Lays a set's fragments over what the attachment holds.
 fn blend(draw: &Draw, held: &mut Reference, drawn: &Reference) {
-    let viewport = draw.viewport();
-    let left = viewport.x as i64;
-    let top = (viewport.y + viewport.height.min(0.0)) as i64;
+    let [left, top] = Covered::of(&draw.viewport()).first;
     let inside = |rectangle: Option<vk::Rect2D>, [x, y]: [i64; 2]| {
         rectangle.is_none_or(|vk::Rect2D { offset, extent }| {
             let [right, bottom] = [

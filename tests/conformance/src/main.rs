@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use clap::Parser;
 use gaurast_conformance::report::{Counts, Result, junit};
-use gaurast_conformance::{Case, Implementation, Outcome, all, cases, open};
+use gaurast_conformance::{Case, Implementation, Outcome, all, cases, open, run};
 
 /// Runs the conformance cases of VK_GAURAST_gaussian_primitive_topology on a driver.
 ///
@@ -70,7 +70,7 @@ fn main() -> ExitCode {
     println!("{} cases on {}", cases.len(), device.name());
     let results: Vec<Result> = cases
         .iter()
-        .map(|case| run(&*device, case, &arguments))
+        .map(|case| tell(&*device, case, &arguments))
         .collect();
     for chapter in cases::chapters() {
         let own: Vec<&Result> = results
@@ -108,9 +108,9 @@ fn line(counts: Counts) -> String {
 }
 
 /// Runs a case, and prints what came of it.
-fn run(device: &dyn Implementation, case: &Case, arguments: &Arguments) -> Result {
+fn tell(device: &dyn Implementation, case: &Case, arguments: &Arguments) -> Result {
     let start = Instant::now();
-    let outcome = case.run(device);
+    let outcome = run(case, device);
     let time = start.elapsed();
     match &outcome {
         Outcome::Pass(distance) if arguments.verbose => {

@@ -5,7 +5,9 @@ use std::process::ExitCode;
 
 use simdevice::mistakes::{Mistake, make};
 
-use crate::{Case, Implementation, Outcome};
+use crate::cases::Case;
+use crate::implementation::Implementation;
+use crate::run::{Outcome, run};
 
 /// Has the device make each mistake, and prints which cases catch it, by chapter. Fails if none does, or if a case fails where
 /// no mistake is made.
@@ -51,6 +53,6 @@ pub fn prove(device: &dyn Implementation, cases: &[Case]) -> ExitCode {
 }
 
 fn failing<'a>(device: &dyn Implementation, cases: &'a [Case]) -> Vec<&'a Case> {
-    let fails = |case: &&Case| matches!(case.run(device), Outcome::Fail(_));
+    let fails = |case: &&Case| matches!(run(case, device), Outcome::Fail(_));
     cases.iter().filter(fails).collect()
 }

@@ -8,18 +8,9 @@ use gaurast::vk::{
 use gaurast_oracle::oracle::Stored;
 use half::f16;
 
-use crate::Implementation;
 use crate::device::{Buffer, Device, Error, Image, Scope, whole};
 use crate::draw::{Blend, Call, ColorFormat, Draw};
-
-/// What the attachments hold after a draw.
-#[derive(Clone, Debug, Default)]
-pub struct Picture {
-    /// Colours, row by row; resolved, if there are several samples.
-    pub color: Vec<[f32; 4]>,
-    /// Depths as numbers of their format and stencils, if they are tested and there is one sample.
-    pub stored: Stored,
-}
+use crate::implementation::Picture;
 
 /// Vertex buffers of a scene: positions, scales, rotations, opacities, coefficients.
 const BINDINGS: u32 = 5;
@@ -28,94 +19,82 @@ const BINDINGS: u32 = 5;
 const MODEL_MATRIX: u32 = 20;
 const MODEL_OPACITY: u32 = 23;
 
-impl Implementation for Device {
-    fn name(&self) -> &str {
-        &self.name
-    }
-
-    fn missing(&self, draw: &Draw) -> Option<&'static str> {
-        draw.missing(self)
-    }
-
-    fn draw(&self, draw: &Draw, stored: &Stored) -> Result<Picture, Error> {
-        let scope = Scope::new(self);
-        let targets = Targets::new(&scope, draw, stored)?;
-        let (pipeline, layout) = pipeline(&scope, draw)?;
-        let scene = scene_buffers(&scope, draw)?;
-        let indices = scope.buffer_of(&draw.indices)?;
-        let parameters: Vec<[u32; 4]> = (draw.calls.iter())
-            .map(|call| match *call {
-                Call::Indirect {
-                    vertices: [first, count],
-                } => [count, 1, first, 0],
-                _ => [0; 4],
-            })
-            .collect();
-        let parameters = scope.buffer_of(&parameters)?;
-        let camera = match layout.sets {
-            Some(set) => Some((camera_set(&scope, draw, set)?, layout.raw)),
-            None => None,
-        };
-        let raw = &self.raw;
-        self.run(|commands| {
-            targets.begin(&scope, draw, commands);
-            // SAFETY: see `device`.
-            unsafe {
-                raw.cmd_bind_pipeline(commands, vk::PipelineBindPoint::GRAPHICS, pipeline);
-                raw.cmd_set_viewport(commands, 0, &[draw.viewport()]);
-                raw.cmd_set_scissor(commands, 0, &[scissor(draw)]);
-                let buffers: Vec<vk::Buffer> = scene.iter().map(|buffer| buffer.raw).collect();
-                raw.cmd_bind_vertex_buffers(commands, 0, &buffers, &vec![0; buffers.len()]);
-                raw.cmd_bind_index_buffer(commands, indices.raw, 0, vk::IndexType::UINT32);
-                match camera {
-                    Some((set, layout)) => raw.cmd_bind_descriptor_sets(
-                        commands,
-                        vk::PipelineBindPoint::GRAPHICS,
-                        layout,
-                        0,
-                        &[set],
-                        &[],
-                    ),
-                    None => self
-                        .gaussian
-                        .cmd_set_gaussian_camera(commands, &draw.camera),
-                }
-                for (number, call) in draw.calls.iter().enumerate() {
-                    match *call {
-                        Call::Draw {
-                            vertices,
-                            instances,
-                        } => raw.cmd_draw(
-                            commands,
-                            vertices[1],
-                            instances[1],
-                            vertices[0],
-                            instances[0],
-                        ),
-                        Call::Indexed {
-                            indices: [first, count],
-                            offset,
-                        } => {
-                            raw.cmd_draw_indexed(commands, count, 1, first, offset, 0);
-                        }
-                        Call::Indirect { .. } => {
-                            raw.cmd_draw_indirect(
-                                commands,
-                                parameters.raw,
-                                16 * number as u64,
-                                1,
-                                16,
-                            );
-                        }
-                        Call::EndSet => raw.cmd_set_scissor(commands, 0, &[scissor(draw)]),
-                    }
-                }
-                raw.cmd_end_rendering(commands);
+/// Draws on a device.
+///
+/// # Errors
+/// If a command fails.
+pub fn record(device: &Device, draw: &Draw, stored: &Stored) -> Result<Picture, Error> {
+    let scope = Scope::new(device);
+    let targets = Targets::new(&scope, draw, stored)?;
+    let (pipeline, layout) = pipeline(&scope, draw)?;
+    let scene = scene_buffers(&scope, draw)?;
+    let indices = scope.buffer_of(&draw.indices)?;
+    let parameters: Vec<[u32; 4]> = (draw.calls.iter())
+        .map(|call| match *call {
+            Call::Indirect {
+                vertices: [first, count],
+            } => [count, 1, first, 0],
+            _ => [0; 4],
+        })
+        .collect();
+    let parameters = scope.buffer_of(&parameters)?;
+    let camera = match layout.sets {
+        Some(set) => Some((camera_set(&scope, draw, set)?, layout.raw)),
+        None => None,
+    };
+    let raw = &device.raw;
+    device.run(|commands| {
+        targets.begin(&scope, draw, commands);
+        // SAFETY: see `device`.
+        unsafe {
+            raw.cmd_bind_pipeline(commands, vk::PipelineBindPoint::GRAPHICS, pipeline);
+            raw.cmd_set_viewport(commands, 0, &[draw.viewport()]);
+            raw.cmd_set_scissor(commands, 0, &[scissor(draw)]);
+            let buffers: Vec<vk::Buffer> = scene.iter().map(|buffer| buffer.raw).collect();
+            raw.cmd_bind_vertex_buffers(commands, 0, &buffers, &vec![0; buffers.len()]);
+            raw.cmd_bind_index_buffer(commands, indices.raw, 0, vk::IndexType::UINT32);
+            match camera {
+                Some((set, layout)) => raw.cmd_bind_descriptor_sets(
+                    commands,
+                    vk::PipelineBindPoint::GRAPHICS,
+                    layout,
+                    0,
+                    &[set],
+                    &[],
+                ),
+                None => device
+                    .gaussian
+                    .cmd_set_gaussian_camera(commands, &draw.camera),
             }
-            targets.copy(&scope, draw, commands);
-        })?;
-        Ok(targets.read(&scope, draw))
-    }
+            for (number, call) in draw.calls.iter().enumerate() {
+                match *call {
+                    Call::Draw {
+                        vertices,
+                        instances,
+                    } => raw.cmd_draw(
+                        commands,
+                        vertices[1],
+                        instances[1],
+                        vertices[0],
+                        instances[0],
+                    ),
+                    Call::Indexed {
+                        indices: [first, count],
+                        offset,
+                    } => {
+                        raw.cmd_draw_indexed(commands, count, 1, first, offset, 0);
+                    }
+                    Call::Indirect { .. } => {
+                        raw.cmd_draw_indirect(commands, parameters.raw, 16 * number as u64, 1, 16);
+                    }
+                    Call::EndSet => raw.cmd_set_scissor(commands, 0, &[scissor(draw)]),
+                }
+            }
+            raw.cmd_end_rendering(commands);
+        }
+        targets.copy(&scope, draw, commands);
+    })?;
+    Ok(targets.read(&scope, draw))
 }
 
 fn scissor(draw: &Draw) -> vk::Rect2D {

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::time::Duration;
 
-use crate::Outcome;
+use crate::run::Outcome;
 
 /// A case that was run.
 #[derive(Clone, Debug)]
@@ -112,7 +112,7 @@ mod tests {
             outcome,
             time: Duration::from_millis(1500),
         };
-        let failure = crate::Failure {
+        let failure = crate::run::Failure {
             message: "2 < 3 & \"so\"".to_owned(),
             picture: None,
         };

@@ -9,11 +9,10 @@ use gaurast::vk::{
 use gaurast_oracle::oracle::Stored;
 use gaurast_second as second;
 
-use crate::Implementation;
 use crate::device::Error;
 use crate::draw::{Blend, ColorFormat, Draw};
+use crate::implementation::{Implementation, Picture};
 use crate::judge::{gathered, sets};
-use crate::record::Picture;
 
 /// The second implementation.
 pub struct Second;

@@ -4,56 +4,7 @@ use std::ops::Range;
 
 use crate::linear::{Vector, widened};
 use crate::project::{Camera, Gaussian, Projected, State, project};
-
-/// A viewport, in pixels of the framebuffer. Its height may be negative.
-#[derive(Clone, Copy, Debug)]
-pub struct Viewport {
-    /// The left edge.
-    pub x: f32,
-    /// The upper edge, or the lower one if the height is negative.
-    pub y: f32,
-    /// The width.
-    pub width: f32,
-    /// The height.
-    pub height: f32,
-    /// What a depth of 0 becomes.
-    pub min_depth: f32,
-    /// What a depth of 1 becomes.
-    pub max_depth: f32,
-}
-
-impl Viewport {
-    /// A viewport over a whole attachment of width x height pixels.
-    pub fn whole(width: usize, height: usize) -> Self {
-        Self {
-            x: 0.0,
-            y: 0.0,
-            width: width as f32,
-            height: height as f32,
-            min_depth: 0.0,
-            max_depth: 1.0,
-        }
-    }
-
-    /// Width and height, without signs.
-    pub(crate) fn size(&self) -> [f64; 2] {
-        [f64::from(self.width), f64::from(self.height).abs()]
-    }
-
-    /// The upper left corner of the area.
-    fn origin(&self) -> [f64; 2] {
-        [
-            f64::from(self.x),
-            f64::from(self.y) + f64::from(self.height).min(0.0),
-        ]
-    }
-
-    /// A camera's depth as the viewport maps it.
-    fn mapped(&self, depth: f64) -> f64 {
-        let [least, greatest] = widened([self.min_depth, self.max_depth]);
-        least + depth.clamp(0.0, 1.0) * (greatest - least)
-    }
-}
+use crate::viewport::Viewport;
 
 /// A comparison of a Gaussian's depth with the one that is stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

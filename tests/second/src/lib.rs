@@ -10,6 +10,8 @@ mod draw;
 mod harmonics;
 mod linear;
 mod project;
+mod viewport;
 
-pub use draw::{Attachments, CompareOp, DepthFormat, DepthTest, Viewport, draw};
+pub use draw::{Attachments, CompareOp, DepthFormat, DepthTest, draw};
 pub use project::{Antialiasing, Camera, Gaussian, State};
+pub use viewport::Viewport;

@@ -1,10 +1,10 @@
 //! Steps 1 to 5: what one Gaussian is in the picture.
 
-use crate::draw::Viewport;
 use crate::harmonics;
 use crate::linear::{
     Matrix, Vector, apply, cross, dot, length, row_times, scaled, subtract, widened,
 };
+use crate::viewport::Viewport;
 
 /// The attributes of one Gaussian, as binary32.
 #[derive(Clone, Copy, Debug)]

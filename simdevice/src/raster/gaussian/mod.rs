@@ -199,11 +199,10 @@ impl<'a> GaussianTileDraw<'a> {
         let touched = lanes_within(self.draw.bounds.intersect(tile.pixels), corner);
         let mut samples = Samples::default();
         for sample in 0..self.samples {
+            let is_masked = self.draw.state.sample_mask >> sample & 1 == 0;
             #[cfg(feature = "mistakes")]
-            let is_masked = !Mistake::NoSampleMask.is_made();
-            #[cfg(not(feature = "mistakes"))]
-            let is_masked = true;
-            if is_masked && self.draw.state.sample_mask >> sample & 1 == 0 {
+            let is_masked = is_masked && !Mistake::NoSampleMask.is_made();
+            if is_masked {
                 continue;
             }
             let mut lanes = touched;

@@ -6,7 +6,7 @@ use gaurast::vk::{
     PipelineGaussianStateCreateFlagsGAURAST as Flags,
 };
 
-use super::Chapter;
+use super::chapter::Chapter;
 use super::scenes::{Gaussian, ball, cameras, dense, front, layered, many};
 use crate::draw::{Blend, Call, Camera, ColorFormat, Depth, Draw, SIZE};
 
@@ -303,6 +303,22 @@ pub(super) fn interactions(chapter: &mut Chapter<'_>) {
                 ..Draw::new(dense(43, 0)).seen_by(camera)
             });
         }
+    }
+    // The oracle has no fractions of pixels: no slope of this scene is clamped.
+    let wide = front()
+        .focal_length([35.0; 2])
+        .principal_point([30.5, 23.5]);
+    for (name, viewport) in [
+        ("corner", viewport(13.25, 20.625, 61.0, 47.0, whole)),
+        ("half", viewport(12.5, 20.5, 61.0, 47.0, whole)),
+        ("size", viewport(13.0, 21.0, 61.75, 47.25, whole)),
+        ("upside_down", viewport(13.75, 68.25, 60.5, -47.5, whole)),
+    ] {
+        chapter.add(format!("viewport.fractions.{name}"), move || Draw {
+            viewport,
+            behind,
+            ..Draw::new(dense(49, 0)).seen_by(wide)
+        });
     }
     let rectangle = |x, y, width, height| {
         Some(vk::Rect2D {

@@ -7,7 +7,7 @@ use gaurast::vk::{
 };
 use gaurast_oracle::oracle::OracleInstance;
 
-use super::Chapter;
+use super::chapter::Chapter;
 use super::modes::ORDERS;
 use super::scenes::{Gaussian, SceneBuffers, ball, cameras, cloud, dense, layered, many};
 use crate::draw::{Call, Draw, State};

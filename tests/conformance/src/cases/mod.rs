@@ -1,49 +1,14 @@
 //! The cases, chapter by chapter, each made from a table.
 
 mod attachments;
+mod chapter;
 mod input;
 mod modes;
 mod numerics;
 mod scenes;
 
-use crate::draw::Draw;
-
-/// A case: a draw with a name.
-pub struct Case {
-    /// The chapter, a word.
-    pub chapter: &'static str,
-    /// The name within the chapter: words and their values, with full stops between.
-    pub name: String,
-    make: Box<dyn Fn() -> Draw + Send + Sync>,
-}
-
-impl Case {
-    /// Chapter and name.
-    pub fn path(&self) -> String {
-        format!("{}.{}", self.chapter, self.name)
-    }
-
-    /// The draw, which is made anew each time.
-    pub fn draw(&self) -> Draw {
-        (self.make)()
-    }
-}
-
-/// A chapter that is being written.
-struct Chapter<'a> {
-    name: &'static str,
-    cases: &'a mut Vec<Case>,
-}
-
-impl Chapter<'_> {
-    fn add(&mut self, name: impl Into<String>, make: impl Fn() -> Draw + Send + Sync + 'static) {
-        self.cases.push(Case {
-            chapter: self.name,
-            name: name.into(),
-            make: Box::new(make),
-        });
-    }
-}
+pub use chapter::Case;
+use chapter::Chapter;
 
 type Write = fn(&mut Chapter<'_>);
 
@@ -75,10 +40,7 @@ pub fn chapters() -> impl Iterator<Item = &'static str> {
 pub fn all() -> Vec<Case> {
     let mut cases = Vec::new();
     for (name, write) in CHAPTERS {
-        write(&mut Chapter {
-            name,
-            cases: &mut cases,
-        });
+        write(&mut Chapter::new(name, &mut cases));
     }
     cases
 }

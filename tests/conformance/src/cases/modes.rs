@@ -6,7 +6,7 @@ use gaurast::vk::{
     GaussianOrderGAURAST as Order, GaussianPrecisionGAURAST as Precision,
 };
 
-use super::Chapter;
+use super::chapter::Chapter;
 use super::scenes::{
     Gaussian, SceneBuffers, ball, cameras, cloud, dense, few, front, layered, many, parallels,
     pinholes, strange,

@@ -2,7 +2,7 @@
 
 use gaurast::vk::GaussianAntialiasingGAURAST as Antialiasing;
 
-use super::Chapter;
+use super::chapter::Chapter;
 use super::modes::ORDERS;
 use super::scenes::{Gaussian, ball, cloud, dense, front, many, strange};
 use crate::draw::{Camera, Draw};
