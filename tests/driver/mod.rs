@@ -8,6 +8,10 @@ mod limits;
 mod loader_door;
 mod multiview;
 mod pipelines;
+mod presentation;
 mod queues;
 mod robustness;
 mod samplers;
+mod window;
+#[cfg(target_os = "linux")]
+mod x11;

@@ -294,6 +294,9 @@ static ROWS: &[Command] = rows! {
         vkCmdSetLogicOpEXT: vk::PFN_vkCmdSetLogicOpEXT = vkCmdSetLogicOpEXT;
         vkCmdSetPrimitiveRestartEnableEXT: vk::PFN_vkCmdSetPrimitiveRestartEnable = vkCmdSetPrimitiveRestartEnable;
     }
+    Instance, InstanceExtension(&[c"VK_EXT_headless_surface"]) => {
+        vkCreateHeadlessSurfaceEXT: vk::PFN_vkCreateHeadlessSurfaceEXT = vkCreateHeadlessSurfaceEXT;
+    }
     Device, DeviceExtension(&[c"VK_EXT_host_query_reset"]) => {
         vkResetQueryPoolEXT: vk::PFN_vkResetQueryPool = vkResetQueryPool;
     }
@@ -340,6 +343,22 @@ static ROWS: &[Command] = rows! {
     Device, DeviceExtension(&[c"VK_KHR_descriptor_update_template", c"VK_KHR_push_descriptor"]) => {
         vkCmdPushDescriptorSetWithTemplateKHR: vk::PFN_vkCmdPushDescriptorSetWithTemplateKHR = vkCmdPushDescriptorSetWithTemplateKHR;
     }
+    Device, DeviceExtension(&[c"VK_KHR_device_group"]) => {
+        vkGetDeviceGroupPeerMemoryFeaturesKHR: vk::PFN_vkGetDeviceGroupPeerMemoryFeatures = vkGetDeviceGroupPeerMemoryFeatures;
+        vkCmdSetDeviceMaskKHR: vk::PFN_vkCmdSetDeviceMask = vkCmdSetDeviceMask;
+        vkCmdDispatchBaseKHR: vk::PFN_vkCmdDispatchBase = vkCmdDispatchBase;
+    }
+    Device, DeviceExtension(&[c"VK_KHR_device_group", c"VK_KHR_swapchain"]) => {
+        vkGetDeviceGroupPresentCapabilitiesKHR: vk::PFN_vkGetDeviceGroupPresentCapabilitiesKHR = vkGetDeviceGroupPresentCapabilitiesKHR;
+        vkGetDeviceGroupSurfacePresentModesKHR: vk::PFN_vkGetDeviceGroupSurfacePresentModesKHR = vkGetDeviceGroupSurfacePresentModesKHR;
+        vkAcquireNextImage2KHR: vk::PFN_vkAcquireNextImage2KHR = vkAcquireNextImage2KHR;
+    }
+    PhysicalDevice, DeviceExtension(&[c"VK_KHR_device_group", c"VK_KHR_swapchain"]) => {
+        vkGetPhysicalDevicePresentRectanglesKHR: vk::PFN_vkGetPhysicalDevicePresentRectanglesKHR = vkGetPhysicalDevicePresentRectanglesKHR;
+    }
+    Instance, InstanceExtension(&[c"VK_KHR_device_group_creation"]) => {
+        vkEnumeratePhysicalDeviceGroupsKHR: vk::PFN_vkEnumeratePhysicalDeviceGroups = vkEnumeratePhysicalDeviceGroups;
+    }
     Device, DeviceExtension(&[c"VK_KHR_draw_indirect_count"]) => {
         vkCmdDrawIndirectCountKHR: vk::PFN_vkCmdDrawIndirectCount = vkCmdDrawIndirectCount;
         vkCmdDrawIndexedIndirectCountKHR: vk::PFN_vkCmdDrawIndexedIndirectCount = vkCmdDrawIndexedIndirectCount;
@@ -371,6 +390,10 @@ static ROWS: &[Command] = rows! {
         vkGetPhysicalDeviceMemoryProperties2KHR: vk::PFN_vkGetPhysicalDeviceMemoryProperties2 = vkGetPhysicalDeviceMemoryProperties2;
         vkGetPhysicalDeviceSparseImageFormatProperties2KHR: vk::PFN_vkGetPhysicalDeviceSparseImageFormatProperties2 = vkGetPhysicalDeviceSparseImageFormatProperties2;
     }
+    PhysicalDevice, InstanceExtension(&[c"VK_KHR_get_surface_capabilities2"]) => {
+        vkGetPhysicalDeviceSurfaceCapabilities2KHR: vk::PFN_vkGetPhysicalDeviceSurfaceCapabilities2KHR = vkGetPhysicalDeviceSurfaceCapabilities2KHR;
+        vkGetPhysicalDeviceSurfaceFormats2KHR: vk::PFN_vkGetPhysicalDeviceSurfaceFormats2KHR = vkGetPhysicalDeviceSurfaceFormats2KHR;
+    }
     Device, DeviceExtension(&[c"VK_KHR_maintenance1"]) => {
         vkTrimCommandPoolKHR: vk::PFN_vkTrimCommandPool = vkTrimCommandPool;
     }
@@ -397,6 +420,22 @@ static ROWS: &[Command] = rows! {
     Device, DeviceExtension(&[c"VK_KHR_push_descriptor"]) => {
         vkCmdPushDescriptorSetKHR: vk::PFN_vkCmdPushDescriptorSetKHR = vkCmdPushDescriptorSetKHR;
     }
+    Instance, InstanceExtension(&[c"VK_KHR_surface"]) => {
+        vkDestroySurfaceKHR: vk::PFN_vkDestroySurfaceKHR = vkDestroySurfaceKHR;
+    }
+    PhysicalDevice, InstanceExtension(&[c"VK_KHR_surface"]) => {
+        vkGetPhysicalDeviceSurfaceSupportKHR: vk::PFN_vkGetPhysicalDeviceSurfaceSupportKHR = vkGetPhysicalDeviceSurfaceSupportKHR;
+        vkGetPhysicalDeviceSurfaceCapabilitiesKHR: vk::PFN_vkGetPhysicalDeviceSurfaceCapabilitiesKHR = vkGetPhysicalDeviceSurfaceCapabilitiesKHR;
+        vkGetPhysicalDeviceSurfaceFormatsKHR: vk::PFN_vkGetPhysicalDeviceSurfaceFormatsKHR = vkGetPhysicalDeviceSurfaceFormatsKHR;
+        vkGetPhysicalDeviceSurfacePresentModesKHR: vk::PFN_vkGetPhysicalDeviceSurfacePresentModesKHR = vkGetPhysicalDeviceSurfacePresentModesKHR;
+    }
+    Device, DeviceExtension(&[c"VK_KHR_swapchain"]) => {
+        vkCreateSwapchainKHR: vk::PFN_vkCreateSwapchainKHR = vkCreateSwapchainKHR;
+        vkDestroySwapchainKHR: vk::PFN_vkDestroySwapchainKHR = vkDestroySwapchainKHR;
+        vkGetSwapchainImagesKHR: vk::PFN_vkGetSwapchainImagesKHR = vkGetSwapchainImagesKHR;
+        vkAcquireNextImageKHR: vk::PFN_vkAcquireNextImageKHR = vkAcquireNextImageKHR;
+        vkQueuePresentKHR: vk::PFN_vkQueuePresentKHR = vkQueuePresentKHR;
+    }
     Device, DeviceExtension(&[c"VK_KHR_synchronization2"]) => {
         vkCmdSetEvent2KHR: vk::PFN_vkCmdSetEvent2 = vkCmdSetEvent2;
         vkCmdResetEvent2KHR: vk::PFN_vkCmdResetEvent2 = vkCmdResetEvent2;
@@ -409,6 +448,24 @@ static ROWS: &[Command] = rows! {
         vkGetSemaphoreCounterValueKHR: vk::PFN_vkGetSemaphoreCounterValue = vkGetSemaphoreCounterValue;
         vkWaitSemaphoresKHR: vk::PFN_vkWaitSemaphores = vkWaitSemaphores;
         vkSignalSemaphoreKHR: vk::PFN_vkSignalSemaphore = vkSignalSemaphore;
+    }
+    Instance, InstanceExtension(&[c"VK_KHR_wayland_surface"]) => {
+        vkCreateWaylandSurfaceKHR: vk::PFN_vkCreateWaylandSurfaceKHR = vkCreateWaylandSurfaceKHR;
+    }
+    PhysicalDevice, InstanceExtension(&[c"VK_KHR_wayland_surface"]) => {
+        vkGetPhysicalDeviceWaylandPresentationSupportKHR: vk::PFN_vkGetPhysicalDeviceWaylandPresentationSupportKHR = vkGetPhysicalDeviceWaylandPresentationSupportKHR;
+    }
+    Instance, InstanceExtension(&[c"VK_KHR_xcb_surface"]) => {
+        vkCreateXcbSurfaceKHR: vk::PFN_vkCreateXcbSurfaceKHR = vkCreateXcbSurfaceKHR;
+    }
+    PhysicalDevice, InstanceExtension(&[c"VK_KHR_xcb_surface"]) => {
+        vkGetPhysicalDeviceXcbPresentationSupportKHR: vk::PFN_vkGetPhysicalDeviceXcbPresentationSupportKHR = vkGetPhysicalDeviceXcbPresentationSupportKHR;
+    }
+    Instance, InstanceExtension(&[c"VK_KHR_xlib_surface"]) => {
+        vkCreateXlibSurfaceKHR: vk::PFN_vkCreateXlibSurfaceKHR = vkCreateXlibSurfaceKHR;
+    }
+    PhysicalDevice, InstanceExtension(&[c"VK_KHR_xlib_surface"]) => {
+        vkGetPhysicalDeviceXlibPresentationSupportKHR: vk::PFN_vkGetPhysicalDeviceXlibPresentationSupportKHR = vkGetPhysicalDeviceXlibPresentationSupportKHR;
     }
 };
 
@@ -3005,7 +3062,7 @@ unsafe extern "system" fn vkBindImageMemory2(
     guard(device, "vkBindImageMemory2", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            crate::resource::image::bind_image_memory2(valid::slice(p_bind_infos, bind_info_count)?)
+            crate::swapchain::bind_image_memory2(valid::slice(p_bind_infos, bind_info_count)?)
                 .map(|()| vk::Result::SUCCESS)
         }
     })
@@ -4477,6 +4534,24 @@ unsafe extern "system" fn vkCmdSetLogicOpEXT(command_buffer: vk::CommandBuffer, 
     })
 }
 
+unsafe extern "system" fn vkCreateHeadlessSurfaceEXT(
+    instance: vk::Instance,
+    _: *const vk::HeadlessSurfaceCreateInfoEXT<'_>,
+    _: *const vk::AllocationCallbacks<'_>,
+    p_surface: *mut vk::SurfaceKHR,
+) -> vk::Result {
+    guard(instance, "vkCreateHeadlessSurfaceEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_surface,
+                handle::create(crate::surface::create_headless_surface()?),
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
 unsafe extern "system" fn vkCmdSetGaussianCameraGAURAST(
     command_buffer: vk::CommandBuffer,
     p_camera: *const gaurast::vk::GaussianCameraGAURAST<'_>,
@@ -4524,6 +4599,123 @@ unsafe extern "system" fn vkCmdPushDescriptorSetWithTemplateKHR(
                         )
                     },
                 )
+            }
+        },
+    )
+}
+
+unsafe extern "system" fn vkGetDeviceGroupPresentCapabilitiesKHR(
+    device: vk::Device,
+    p_device_group_present_capabilities: *mut vk::DeviceGroupPresentCapabilitiesKHR<'_>,
+) -> vk::Result {
+    guard(device, "vkGetDeviceGroupPresentCapabilitiesKHR", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::surface::get_device_group_present_capabilities(valid::output_structure(
+                p_device_group_present_capabilities,
+            )?)
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkGetDeviceGroupSurfacePresentModesKHR(
+    device: vk::Device,
+    surface: vk::SurfaceKHR,
+    p_modes: *mut vk::DeviceGroupPresentModeFlagsKHR,
+) -> vk::Result {
+    guard(device, "vkGetDeviceGroupSurfacePresentModesKHR", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_modes,
+                crate::surface::get_device_group_surface_present_modes(handle::get(surface)?)?,
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkGetPhysicalDevicePresentRectanglesKHR(
+    physical_device: vk::PhysicalDevice,
+    surface: vk::SurfaceKHR,
+    p_rect_count: *mut u32,
+    p_rects: *mut vk::Rect2D,
+) -> vk::Result {
+    guard(
+        physical_device,
+        "vkGetPhysicalDevicePresentRectanglesKHR",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                valid::enumerate(
+                    p_rect_count,
+                    p_rects,
+                    &crate::surface::get_physical_device_present_rectangles(handle::get(surface)?)?,
+                )
+            }
+        },
+    )
+}
+
+unsafe extern "system" fn vkAcquireNextImage2KHR(
+    device: vk::Device,
+    p_acquire_info: *const vk::AcquireNextImageInfoKHR<'_>,
+    p_image_index: *mut u32,
+) -> vk::Result {
+    guard(device, "vkAcquireNextImage2KHR", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            let info = valid::input(p_acquire_info)?;
+            crate::swapchain::acquire_next_image(
+                handle::get(info.swapchain)?,
+                info.timeout,
+                handle::get_optional(info.semaphore)?.map(AsRef::as_ref),
+                handle::get_optional(info.fence)?.map(AsRef::as_ref),
+                valid::output_structure(p_image_index)?,
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkGetPhysicalDeviceSurfaceCapabilities2KHR(
+    physical_device: vk::PhysicalDevice,
+    p_surface_info: *const vk::PhysicalDeviceSurfaceInfo2KHR<'_>,
+    p_surface_capabilities: *mut vk::SurfaceCapabilities2KHR<'_>,
+) -> vk::Result {
+    guard(
+        physical_device,
+        "vkGetPhysicalDeviceSurfaceCapabilities2KHR",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                let info = valid::input(p_surface_info)?;
+                crate::surface::get_physical_device_surface_capabilities2(
+                    handle::get(info.surface)?,
+                    OutputChain::new(p_surface_capabilities)?,
+                )
+                .map(|()| vk::Result::SUCCESS)
+            }
+        },
+    )
+}
+
+unsafe extern "system" fn vkGetPhysicalDeviceSurfaceFormats2KHR(
+    physical_device: vk::PhysicalDevice,
+    _: *const vk::PhysicalDeviceSurfaceInfo2KHR<'_>,
+    p_surface_format_count: *mut u32,
+    p_surface_formats: *mut vk::SurfaceFormat2KHR<'_>,
+) -> vk::Result {
+    guard(
+        physical_device,
+        "vkGetPhysicalDeviceSurfaceFormats2KHR",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                crate::surface::get_physical_device_surface_formats2(Structures::new(
+                    p_surface_format_count,
+                    p_surface_formats,
+                )?)
             }
         },
     )
@@ -4648,4 +4840,291 @@ unsafe extern "system" fn vkCmdPushDescriptorSetKHR(
             })
         }
     })
+}
+
+unsafe extern "system" fn vkDestroySurfaceKHR(
+    instance: vk::Instance,
+    surface: vk::SurfaceKHR,
+    _: *const vk::AllocationCallbacks<'_>,
+) {
+    guard(instance, "vkDestroySurfaceKHR", || {
+        // SAFETY: the application follows Vulkan's valid usage: the handle is null or live, and used no more.
+        unsafe { handle::destroy(surface) }.map(drop)
+    })
+}
+
+unsafe extern "system" fn vkGetPhysicalDeviceSurfaceSupportKHR(
+    physical_device: vk::PhysicalDevice,
+    _: u32,
+    surface: vk::SurfaceKHR,
+    p_supported: *mut vk::Bool32,
+) -> vk::Result {
+    guard(
+        physical_device,
+        "vkGetPhysicalDeviceSurfaceSupportKHR",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                valid::output(
+                    p_supported,
+                    crate::surface::get_physical_device_surface_support(handle::get(surface)?)?,
+                )
+                .map(|()| vk::Result::SUCCESS)
+            }
+        },
+    )
+}
+
+unsafe extern "system" fn vkGetPhysicalDeviceSurfaceCapabilitiesKHR(
+    physical_device: vk::PhysicalDevice,
+    surface: vk::SurfaceKHR,
+    p_surface_capabilities: *mut vk::SurfaceCapabilitiesKHR,
+) -> vk::Result {
+    guard(
+        physical_device,
+        "vkGetPhysicalDeviceSurfaceCapabilitiesKHR",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                valid::output(
+                    p_surface_capabilities,
+                    crate::surface::get_physical_device_surface_capabilities(handle::get(
+                        surface,
+                    )?)?,
+                )
+                .map(|()| vk::Result::SUCCESS)
+            }
+        },
+    )
+}
+
+unsafe extern "system" fn vkGetPhysicalDeviceSurfaceFormatsKHR(
+    physical_device: vk::PhysicalDevice,
+    surface: vk::SurfaceKHR,
+    p_surface_format_count: *mut u32,
+    p_surface_formats: *mut vk::SurfaceFormatKHR,
+) -> vk::Result {
+    guard(
+        physical_device,
+        "vkGetPhysicalDeviceSurfaceFormatsKHR",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                valid::enumerate(
+                    p_surface_format_count,
+                    p_surface_formats,
+                    &crate::surface::get_physical_device_surface_formats(handle::get(surface)?)?,
+                )
+            }
+        },
+    )
+}
+
+unsafe extern "system" fn vkGetPhysicalDeviceSurfacePresentModesKHR(
+    physical_device: vk::PhysicalDevice,
+    surface: vk::SurfaceKHR,
+    p_present_mode_count: *mut u32,
+    p_present_modes: *mut vk::PresentModeKHR,
+) -> vk::Result {
+    guard(
+        physical_device,
+        "vkGetPhysicalDeviceSurfacePresentModesKHR",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                valid::enumerate(
+                    p_present_mode_count,
+                    p_present_modes,
+                    &crate::surface::get_physical_device_surface_present_modes(handle::get(
+                        surface,
+                    )?)?,
+                )
+            }
+        },
+    )
+}
+
+unsafe extern "system" fn vkCreateSwapchainKHR(
+    device: vk::Device,
+    p_create_info: *const vk::SwapchainCreateInfoKHR<'_>,
+    _: *const vk::AllocationCallbacks<'_>,
+    p_swapchain: *mut vk::SwapchainKHR,
+) -> vk::Result {
+    guard(device, "vkCreateSwapchainKHR", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            let info = valid::input(p_create_info)?;
+            valid::output(
+                p_swapchain,
+                handle::create(crate::swapchain::create_swapchain(
+                    handle::get(device)?,
+                    valid::input(p_create_info)?,
+                    handle::get(info.surface)?,
+                    handle::get_optional(info.old_swapchain)?.map(AsRef::as_ref),
+                )?),
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkDestroySwapchainKHR(
+    device: vk::Device,
+    swapchain: vk::SwapchainKHR,
+    _: *const vk::AllocationCallbacks<'_>,
+) {
+    guard(device, "vkDestroySwapchainKHR", || {
+        // SAFETY: the application follows Vulkan's valid usage: the handle is null or live, and used no more.
+        unsafe { handle::destroy(swapchain) }.map(drop)
+    })
+}
+
+unsafe extern "system" fn vkGetSwapchainImagesKHR(
+    device: vk::Device,
+    swapchain: vk::SwapchainKHR,
+    p_swapchain_image_count: *mut u32,
+    p_swapchain_images: *mut vk::Image,
+) -> vk::Result {
+    guard(device, "vkGetSwapchainImagesKHR", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::enumerate(
+                p_swapchain_image_count,
+                p_swapchain_images,
+                &crate::swapchain::get_swapchain_images(handle::get(swapchain)?)?,
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkAcquireNextImageKHR(
+    device: vk::Device,
+    swapchain: vk::SwapchainKHR,
+    timeout: u64,
+    semaphore: vk::Semaphore,
+    fence: vk::Fence,
+    p_image_index: *mut u32,
+) -> vk::Result {
+    guard(device, "vkAcquireNextImageKHR", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::swapchain::acquire_next_image(
+                handle::get(swapchain)?,
+                timeout,
+                handle::get_optional(semaphore)?.map(AsRef::as_ref),
+                handle::get_optional(fence)?.map(AsRef::as_ref),
+                valid::output_structure(p_image_index)?,
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkQueuePresentKHR(
+    queue: vk::Queue,
+    p_present_info: *const vk::PresentInfoKHR<'_>,
+) -> vk::Result {
+    guard(queue, "vkQueuePresentKHR", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::swapchain::queue_present(handle::get(queue)?, valid::input(p_present_info)?)
+        }
+    })
+}
+
+unsafe extern "system" fn vkCreateWaylandSurfaceKHR(
+    instance: vk::Instance,
+    p_create_info: *const vk::WaylandSurfaceCreateInfoKHR<'_>,
+    _: *const vk::AllocationCallbacks<'_>,
+    p_surface: *mut vk::SurfaceKHR,
+) -> vk::Result {
+    guard(instance, "vkCreateWaylandSurfaceKHR", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_surface,
+                handle::create(crate::surface::create_wayland_surface(valid::input(
+                    p_create_info,
+                )?)?),
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkGetPhysicalDeviceWaylandPresentationSupportKHR(
+    physical_device: vk::PhysicalDevice,
+    queue_family_index: u32,
+    _: *mut vk::wl_display,
+) -> vk::Bool32 {
+    guard(
+        physical_device,
+        "vkGetPhysicalDeviceWaylandPresentationSupportKHR",
+        || crate::surface::get_physical_device_presentation_support(queue_family_index),
+    )
+}
+
+unsafe extern "system" fn vkCreateXcbSurfaceKHR(
+    instance: vk::Instance,
+    p_create_info: *const vk::XcbSurfaceCreateInfoKHR<'_>,
+    _: *const vk::AllocationCallbacks<'_>,
+    p_surface: *mut vk::SurfaceKHR,
+) -> vk::Result {
+    guard(instance, "vkCreateXcbSurfaceKHR", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_surface,
+                handle::create(crate::surface::create_xcb_surface(valid::input(
+                    p_create_info,
+                )?)?),
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkGetPhysicalDeviceXcbPresentationSupportKHR(
+    physical_device: vk::PhysicalDevice,
+    queue_family_index: u32,
+    _: *mut vk::xcb_connection_t,
+    _: vk::xcb_visualid_t,
+) -> vk::Bool32 {
+    guard(
+        physical_device,
+        "vkGetPhysicalDeviceXcbPresentationSupportKHR",
+        || crate::surface::get_physical_device_presentation_support(queue_family_index),
+    )
+}
+
+unsafe extern "system" fn vkCreateXlibSurfaceKHR(
+    instance: vk::Instance,
+    p_create_info: *const vk::XlibSurfaceCreateInfoKHR<'_>,
+    _: *const vk::AllocationCallbacks<'_>,
+    p_surface: *mut vk::SurfaceKHR,
+) -> vk::Result {
+    guard(instance, "vkCreateXlibSurfaceKHR", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_surface,
+                handle::create(crate::surface::create_xlib_surface(valid::input(
+                    p_create_info,
+                )?)?),
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkGetPhysicalDeviceXlibPresentationSupportKHR(
+    physical_device: vk::PhysicalDevice,
+    queue_family_index: u32,
+    _: *mut vk::Display,
+    _: vk::VisualID,
+) -> vk::Bool32 {
+    guard(
+        physical_device,
+        "vkGetPhysicalDeviceXlibPresentationSupportKHR",
+        || crate::surface::get_physical_device_presentation_support(queue_family_index),
+    )
 }

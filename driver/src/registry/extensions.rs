@@ -11,10 +11,17 @@ pub(crate) type Extension = (&'static CStr, u32);
 /// The instance extensions.
 pub(crate) const INSTANCE: &[Extension] = &[
     (c"VK_EXT_debug_utils", 2),
+    (c"VK_EXT_headless_surface", 1),
+    (c"VK_KHR_device_group_creation", 1),
     (c"VK_KHR_external_fence_capabilities", 1),
     (c"VK_KHR_external_memory_capabilities", 1),
     (c"VK_KHR_external_semaphore_capabilities", 1),
     (c"VK_KHR_get_physical_device_properties2", 2),
+    (c"VK_KHR_get_surface_capabilities2", 1),
+    (c"VK_KHR_surface", 25),
+    (c"VK_KHR_wayland_surface", 6),
+    (c"VK_KHR_xcb_surface", 6),
+    (c"VK_KHR_xlib_surface", 6),
 ];
 
 /// The device extensions.
@@ -56,6 +63,7 @@ pub(crate) const DEVICE: &[Extension] = &[
     (c"VK_KHR_dedicated_allocation", 3),
     (c"VK_KHR_depth_stencil_resolve", 1),
     (c"VK_KHR_descriptor_update_template", 1),
+    (c"VK_KHR_device_group", 4),
     (c"VK_KHR_draw_indirect_count", 1),
     (c"VK_KHR_driver_properties", 1),
     (c"VK_KHR_dynamic_rendering", 1),
@@ -66,6 +74,7 @@ pub(crate) const DEVICE: &[Extension] = &[
     (c"VK_KHR_get_memory_requirements2", 1),
     (c"VK_KHR_image_format_list", 1),
     (c"VK_KHR_imageless_framebuffer", 1),
+    (c"VK_KHR_incremental_present", 2),
     (c"VK_KHR_load_store_op_none", 1),
     (c"VK_KHR_maintenance1", 2),
     (c"VK_KHR_maintenance2", 1),
@@ -86,6 +95,8 @@ pub(crate) const DEVICE: &[Extension] = &[
     (c"VK_KHR_shader_subgroup_extended_types", 1),
     (c"VK_KHR_shader_terminate_invocation", 1),
     (c"VK_KHR_storage_buffer_storage_class", 1),
+    (c"VK_KHR_swapchain", 70),
+    (c"VK_KHR_swapchain_mutable_format", 1),
     (c"VK_KHR_synchronization2", 1),
     (c"VK_KHR_timeline_semaphore", 2),
     (c"VK_KHR_uniform_buffer_standard_layout", 1),
