@@ -100,7 +100,11 @@ impl Gpu {
                 .ok_or("no device draws Gaussians")?;
             let queues = [vk::DeviceQueueCreateInfo::default().queue_priorities(&[1.0])];
             let names = [gaussian_primitive_topology::NAME.as_ptr(), ash::khr::swapchain::NAME.as_ptr()];
-            let mut topology = PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST::default().gaussian_primitive_topology(true);
+            let mut topology = PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST::default();
+            let mut all = vk::PhysicalDeviceFeatures2::default().push_next(&mut topology);
+            instance.get_physical_device_features2(physical, &mut all);
+            // All modes that the device has.
+            topology.p_next = std::ptr::null_mut();
             let mut features = vk::PhysicalDeviceVulkan13Features::default().dynamic_rendering(true);
             let info = vk::DeviceCreateInfo::default().queue_create_infos(&queues).enabled_extension_names(&names)
                 .push_next(&mut topology).push_next(&mut features);
@@ -372,7 +376,8 @@ impl Gpu {
     /// Waits until everything is drawn.
     pub fn wait(&self) -> Outcome<()> {
         // SAFETY: see above.
-        Ok(unsafe { self.device.device_wait_idle()? })
+        unsafe { self.device.device_wait_idle()?; }
+        Ok(())
     }
 }
 
