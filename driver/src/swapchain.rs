@@ -482,3 +482,105 @@ pub(crate) unsafe fn bind_image_memory2(
         bind_image_memory(image, memory, info.memory_offset)
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::mpsc::{Receiver, Sender, channel};
+
+    /// A display that is refreshed when the test says so, and is lost when the test hangs up.
+    struct Display(Receiver<()>);
+
+    impl Canvas for Display {
+        fn wait(&mut self, longest: Duration) -> Result<bool, WindowLost> {
+            use std::sync::mpsc::RecvTimeoutError as E;
+            match self.0.recv_timeout(longest) {
+                Ok(()) => Ok(true),
+                Err(E::Timeout) => Ok(false),
+                Err(E::Disconnected) => Err(WindowLost("in a test".to_owned())),
+            }
+        }
+
+        fn show(&mut self, _copy: &mut dyn FnMut(&mut [u8])) -> Result<(), WindowLost> {
+            Ok(())
+        }
+    }
+
+    /// What runs on a thread for three images, and the display's refresh.
+    fn start(present_mode: PresentMode) -> (Arc<Shared>, Sender<()>, JoinHandle<()>) {
+        let shared = Arc::new(Shared {
+            sync: Arc::default(),
+            present_mode,
+            images: Vec::new(),
+            state: Mutex::default(),
+            changed: Condvar::new(),
+            lost: OnceLock::new(),
+        });
+        let (refresh, display) = channel();
+        let run = Arc::clone(&shared);
+        let thread = std::thread::spawn(move || {
+            if let Err(lost) = run.run(&mut Display(display)) {
+                run.lose(lost);
+            }
+        });
+        (shared, refresh, thread)
+    }
+
+    /// Waits until so many images are free, and says which.
+    fn free(shared: &Shared, count: usize) -> Vec<u32> {
+        let is_free = || shared.state().free.len() >= count;
+        let waited = shared.sync.wait(deadline(20_000_000_000), is_free);
+        assert_eq!(waited, WaitResult::Ready);
+        shared.state().free.iter().copied().collect()
+    }
+
+    #[test]
+    fn pictures_are_shown_in_order_one_at_a_refresh() {
+        let (shared, refresh, thread) = start(PresentMode::Fifo);
+        for image in [2, 0, 1] {
+            shared.present(image);
+        }
+        refresh.send(()).unwrap();
+        assert_eq!(free(&shared, 1), [2]);
+        refresh.send(()).unwrap();
+        refresh.send(()).unwrap();
+        assert_eq!(free(&shared, 3), [2, 0, 1]);
+        shared.retire();
+        thread.join().unwrap();
+    }
+
+    #[test]
+    fn the_newest_picture_takes_the_place_of_those_before_it() {
+        let (shared, refresh, thread) = start(PresentMode::Mailbox);
+        for image in [0, 1, 2] {
+            shared.present(image);
+        }
+        assert_eq!(free(&shared, 2), [0, 1]);
+        refresh.send(()).unwrap();
+        assert_eq!(free(&shared, 3), [0, 1, 2]);
+        shared.retire();
+        thread.join().unwrap();
+    }
+
+    #[test]
+    fn what_waits_is_given_up_when_there_is_no_window_or_another_swapchain() {
+        for retires in [false, true] {
+            let (shared, refresh, thread) = start(PresentMode::Fifo);
+            shared.present(0);
+            shared.present(1);
+            if retires {
+                shared.retire();
+            } else {
+                drop(refresh);
+            }
+            let mut given_up = free(&shared, 2);
+            given_up.sort_unstable();
+            assert_eq!(given_up, [0, 1]);
+            thread.join().unwrap();
+            assert_eq!(shared.lost.get().is_some(), !retires);
+            // What comes later is given up at once.
+            shared.present(2);
+            assert_eq!(free(&shared, 3).last(), Some(&2));
+        }
+    }
+}

@@ -258,6 +258,9 @@ static ROWS: &[Command] = rows! {
         vkCmdSetDepthBiasEnable: vk::PFN_vkCmdSetDepthBiasEnable = vkCmdSetDepthBiasEnable;
         vkCmdSetPrimitiveRestartEnable: vk::PFN_vkCmdSetPrimitiveRestartEnable = vkCmdSetPrimitiveRestartEnable;
     }
+    Device, DeviceExtension(&[c"VK_EXT_color_write_enable"]) => {
+        vkCmdSetColorWriteEnableEXT: vk::PFN_vkCmdSetColorWriteEnableEXT = vkCmdSetColorWriteEnableEXT;
+    }
     Device, InstanceExtension(&[c"VK_EXT_debug_utils"]) => {
         vkSetDebugUtilsObjectNameEXT: vk::PFN_vkSetDebugUtilsObjectNameEXT = vkSetDebugUtilsObjectNameEXT;
         vkSetDebugUtilsObjectTagEXT: vk::PFN_vkSetDebugUtilsObjectTagEXT = vkSetDebugUtilsObjectTagEXT;
@@ -294,11 +297,35 @@ static ROWS: &[Command] = rows! {
         vkCmdSetLogicOpEXT: vk::PFN_vkCmdSetLogicOpEXT = vkCmdSetLogicOpEXT;
         vkCmdSetPrimitiveRestartEnableEXT: vk::PFN_vkCmdSetPrimitiveRestartEnable = vkCmdSetPrimitiveRestartEnable;
     }
+    Device, DeviceExtension(&[c"VK_EXT_extended_dynamic_state3"]) => {
+        vkCmdSetDepthClampEnableEXT: vk::PFN_vkCmdSetDepthClampEnableEXT = vkCmdSetDepthClampEnableEXT;
+        vkCmdSetPolygonModeEXT: vk::PFN_vkCmdSetPolygonModeEXT = vkCmdSetPolygonModeEXT;
+        vkCmdSetRasterizationSamplesEXT: vk::PFN_vkCmdSetRasterizationSamplesEXT = vkCmdSetRasterizationSamplesEXT;
+        vkCmdSetSampleMaskEXT: vk::PFN_vkCmdSetSampleMaskEXT = vkCmdSetSampleMaskEXT;
+        vkCmdSetAlphaToCoverageEnableEXT: vk::PFN_vkCmdSetAlphaToCoverageEnableEXT = vkCmdSetAlphaToCoverageEnableEXT;
+        vkCmdSetAlphaToOneEnableEXT: vk::PFN_vkCmdSetAlphaToOneEnableEXT = vkCmdSetAlphaToOneEnableEXT;
+        vkCmdSetLogicOpEnableEXT: vk::PFN_vkCmdSetLogicOpEnableEXT = vkCmdSetLogicOpEnableEXT;
+        vkCmdSetColorBlendEnableEXT: vk::PFN_vkCmdSetColorBlendEnableEXT = vkCmdSetColorBlendEnableEXT;
+        vkCmdSetColorBlendEquationEXT: vk::PFN_vkCmdSetColorBlendEquationEXT = vkCmdSetColorBlendEquationEXT;
+        vkCmdSetColorWriteMaskEXT: vk::PFN_vkCmdSetColorWriteMaskEXT = vkCmdSetColorWriteMaskEXT;
+        vkCmdSetTessellationDomainOriginEXT: vk::PFN_vkCmdSetTessellationDomainOriginEXT = vkCmdSetTessellationDomainOriginEXT;
+        vkCmdSetDepthClipEnableEXT: vk::PFN_vkCmdSetDepthClipEnableEXT = vkCmdSetDepthClipEnableEXT;
+        vkCmdSetProvokingVertexModeEXT: vk::PFN_vkCmdSetProvokingVertexModeEXT = vkCmdSetProvokingVertexModeEXT;
+        vkCmdSetLineRasterizationModeEXT: vk::PFN_vkCmdSetLineRasterizationModeEXT = vkCmdSetLineRasterizationModeEXT;
+        vkCmdSetLineStippleEnableEXT: vk::PFN_vkCmdSetLineStippleEnableEXT = vkCmdSetLineStippleEnableEXT;
+    }
     Instance, InstanceExtension(&[c"VK_EXT_headless_surface"]) => {
         vkCreateHeadlessSurfaceEXT: vk::PFN_vkCreateHeadlessSurfaceEXT = vkCreateHeadlessSurfaceEXT;
     }
     Device, DeviceExtension(&[c"VK_EXT_host_query_reset"]) => {
         vkResetQueryPoolEXT: vk::PFN_vkResetQueryPool = vkResetQueryPool;
+    }
+    Device, DeviceExtension(&[c"VK_EXT_line_rasterization"]) => {
+        vkCmdSetLineStippleEXT: vk::PFN_vkCmdSetLineStippleKHR = vkCmdSetLineStippleEXT;
+    }
+    Device, DeviceExtension(&[c"VK_EXT_multi_draw"]) => {
+        vkCmdDrawMultiEXT: vk::PFN_vkCmdDrawMultiEXT = vkCmdDrawMultiEXT;
+        vkCmdDrawMultiIndexedEXT: vk::PFN_vkCmdDrawMultiIndexedEXT = vkCmdDrawMultiIndexedEXT;
     }
     Device, DeviceExtension(&[c"VK_EXT_private_data"]) => {
         vkCreatePrivateDataSlotEXT: vk::PFN_vkCreatePrivateDataSlot = vkCreatePrivateDataSlot;
@@ -308,6 +335,9 @@ static ROWS: &[Command] = rows! {
     }
     PhysicalDevice, DeviceExtension(&[c"VK_EXT_tooling_info"]) => {
         vkGetPhysicalDeviceToolPropertiesEXT: vk::PFN_vkGetPhysicalDeviceToolProperties = vkGetPhysicalDeviceToolProperties;
+    }
+    Device, DeviceExtension(&[c"VK_EXT_vertex_input_dynamic_state"]) => {
+        vkCmdSetVertexInputEXT: vk::PFN_vkCmdSetVertexInputEXT = vkCmdSetVertexInputEXT;
     }
     Device, DeviceExtension(&[c"VK_GAURAST_gaussian_primitive_topology"]) => {
         vkCmdSetGaussianCameraGAURAST: gaurast::vk::PFN_vkCmdSetGaussianCameraGAURAST = vkCmdSetGaussianCameraGAURAST;
@@ -4398,6 +4428,24 @@ unsafe extern "system" fn vkCmdSetPrimitiveRestartEnable(
     })
 }
 
+unsafe extern "system" fn vkCmdSetColorWriteEnableEXT(
+    command_buffer: vk::CommandBuffer,
+    attachment_count: u32,
+    p_color_write_enables: *const vk::Bool32,
+) {
+    guard(command_buffer, "vkCmdSetColorWriteEnableEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdSetColorWriteEnableEXT", |recorder| {
+                crate::command::dynamic_state::cmd_set_color_write_enable(
+                    recorder,
+                    valid::slice(p_color_write_enables, attachment_count)?,
+                )
+            })
+        }
+    })
+}
+
 unsafe extern "system" fn vkSetDebugUtilsObjectNameEXT(
     device: vk::Device,
     _: *const vk::DebugUtilsObjectNameInfoEXT<'_>,
@@ -4521,14 +4569,304 @@ unsafe extern "system" fn vkCmdSetPatchControlPointsEXT(command_buffer: vk::Comm
     })
 }
 
-unsafe extern "system" fn vkCmdSetLogicOpEXT(command_buffer: vk::CommandBuffer, _: vk::LogicOp) {
+unsafe extern "system" fn vkCmdSetLogicOpEXT(
+    command_buffer: vk::CommandBuffer,
+    logic_op: vk::LogicOp,
+) {
     guard(command_buffer, "vkCmdSetLogicOpEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdSetLogicOpEXT", |recorder| {
+                crate::command::dynamic_state::cmd_set_logic_op(recorder, logic_op)
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetDepthClampEnableEXT(
+    command_buffer: vk::CommandBuffer,
+    depth_clamp_enable: vk::Bool32,
+) {
+    guard(command_buffer, "vkCmdSetDepthClampEnableEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdSetDepthClampEnableEXT", |recorder| {
+                let enable = depth_clamp_enable != vk::FALSE;
+                crate::command::dynamic_state::set(
+                    recorder,
+                    DynamicState::DepthClampEnable { enable },
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetPolygonModeEXT(
+    command_buffer: vk::CommandBuffer,
+    polygon_mode: vk::PolygonMode,
+) {
+    guard(command_buffer, "vkCmdSetPolygonModeEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdSetPolygonModeEXT", |recorder| {
+                crate::command::dynamic_state::cmd_set_polygon_mode(recorder, polygon_mode)
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetRasterizationSamplesEXT(
+    command_buffer: vk::CommandBuffer,
+    _: vk::SampleCountFlags,
+) {
+    guard(command_buffer, "vkCmdSetRasterizationSamplesEXT", || {
         // SAFETY: the application follows Vulkan's valid usage: the handle is live.
         unsafe {
-            record(command_buffer, "vkCmdSetLogicOpEXT", |_| {
+            record(command_buffer, "vkCmdSetRasterizationSamplesEXT", |_| {
                 Err(Error::Unsupported {
-                    command: "vkCmdSetLogicOpEXT".to_owned(),
+                    command: "vkCmdSetRasterizationSamplesEXT".to_owned(),
                 })
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetSampleMaskEXT(
+    command_buffer: vk::CommandBuffer,
+    _: vk::SampleCountFlags,
+    p_sample_mask: *const vk::SampleMask,
+) {
+    guard(command_buffer, "vkCmdSetSampleMaskEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdSetSampleMaskEXT", |recorder| {
+                crate::command::dynamic_state::cmd_set_sample_mask(
+                    recorder,
+                    valid::optional(p_sample_mask),
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetAlphaToCoverageEnableEXT(
+    command_buffer: vk::CommandBuffer,
+    alpha_to_coverage_enable: vk::Bool32,
+) {
+    guard(command_buffer, "vkCmdSetAlphaToCoverageEnableEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(
+                command_buffer,
+                "vkCmdSetAlphaToCoverageEnableEXT",
+                |recorder| {
+                    let enable = alpha_to_coverage_enable != vk::FALSE;
+                    crate::command::dynamic_state::set(
+                        recorder,
+                        DynamicState::AlphaToCoverageEnable { enable },
+                    )
+                },
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetAlphaToOneEnableEXT(
+    command_buffer: vk::CommandBuffer,
+    alpha_to_one_enable: vk::Bool32,
+) {
+    guard(command_buffer, "vkCmdSetAlphaToOneEnableEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdSetAlphaToOneEnableEXT", |recorder| {
+                let enable = alpha_to_one_enable != vk::FALSE;
+                crate::command::dynamic_state::set(
+                    recorder,
+                    DynamicState::AlphaToOneEnable { enable },
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetLogicOpEnableEXT(
+    command_buffer: vk::CommandBuffer,
+    logic_op_enable: vk::Bool32,
+) {
+    guard(command_buffer, "vkCmdSetLogicOpEnableEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdSetLogicOpEnableEXT", |recorder| {
+                let enable = logic_op_enable != vk::FALSE;
+                crate::command::dynamic_state::set(recorder, DynamicState::LogicOpEnable { enable })
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetColorBlendEnableEXT(
+    command_buffer: vk::CommandBuffer,
+    first_attachment: u32,
+    attachment_count: u32,
+    p_color_blend_enables: *const vk::Bool32,
+) {
+    guard(command_buffer, "vkCmdSetColorBlendEnableEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdSetColorBlendEnableEXT", |recorder| {
+                crate::command::dynamic_state::cmd_set_color_blend_enable(
+                    recorder,
+                    first_attachment,
+                    valid::slice(p_color_blend_enables, attachment_count)?,
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetColorBlendEquationEXT(
+    command_buffer: vk::CommandBuffer,
+    first_attachment: u32,
+    attachment_count: u32,
+    p_color_blend_equations: *const vk::ColorBlendEquationEXT,
+) {
+    guard(command_buffer, "vkCmdSetColorBlendEquationEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(
+                command_buffer,
+                "vkCmdSetColorBlendEquationEXT",
+                |recorder| {
+                    crate::command::dynamic_state::cmd_set_color_blend_equation(
+                        recorder,
+                        first_attachment,
+                        valid::slice(p_color_blend_equations, attachment_count)?,
+                    )
+                },
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetColorWriteMaskEXT(
+    command_buffer: vk::CommandBuffer,
+    first_attachment: u32,
+    attachment_count: u32,
+    p_color_write_masks: *const vk::ColorComponentFlags,
+) {
+    guard(command_buffer, "vkCmdSetColorWriteMaskEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdSetColorWriteMaskEXT", |recorder| {
+                crate::command::dynamic_state::cmd_set_color_write_mask(
+                    recorder,
+                    first_attachment,
+                    valid::slice(p_color_write_masks, attachment_count)?,
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetTessellationDomainOriginEXT(
+    command_buffer: vk::CommandBuffer,
+    _: vk::TessellationDomainOrigin,
+) {
+    guard(
+        command_buffer,
+        "vkCmdSetTessellationDomainOriginEXT",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: the handle is live.
+            unsafe {
+                record(
+                    command_buffer,
+                    "vkCmdSetTessellationDomainOriginEXT",
+                    |_| {
+                        Err(Error::Unsupported {
+                            command: "vkCmdSetTessellationDomainOriginEXT".to_owned(),
+                        })
+                    },
+                )
+            }
+        },
+    )
+}
+
+unsafe extern "system" fn vkCmdSetDepthClipEnableEXT(
+    command_buffer: vk::CommandBuffer,
+    depth_clip_enable: vk::Bool32,
+) {
+    guard(command_buffer, "vkCmdSetDepthClipEnableEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdSetDepthClipEnableEXT", |recorder| {
+                let enable = depth_clip_enable != vk::FALSE;
+                crate::command::dynamic_state::set(
+                    recorder,
+                    DynamicState::DepthClipEnable { enable },
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetProvokingVertexModeEXT(
+    command_buffer: vk::CommandBuffer,
+    provoking_vertex_mode: vk::ProvokingVertexModeEXT,
+) {
+    guard(command_buffer, "vkCmdSetProvokingVertexModeEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(
+                command_buffer,
+                "vkCmdSetProvokingVertexModeEXT",
+                |recorder| {
+                    let mode = provoking_vertex_mode;
+                    crate::command::dynamic_state::set(
+                        recorder,
+                        DynamicState::ProvokingVertexMode { mode },
+                    )
+                },
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetLineRasterizationModeEXT(
+    command_buffer: vk::CommandBuffer,
+    line_rasterization_mode: vk::LineRasterizationModeEXT,
+) {
+    guard(command_buffer, "vkCmdSetLineRasterizationModeEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(
+                command_buffer,
+                "vkCmdSetLineRasterizationModeEXT",
+                |recorder| {
+                    let mode = line_rasterization_mode;
+                    crate::command::dynamic_state::set(
+                        recorder,
+                        DynamicState::LineRasterizationMode { mode },
+                    )
+                },
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetLineStippleEnableEXT(
+    command_buffer: vk::CommandBuffer,
+    stippled_line_enable: vk::Bool32,
+) {
+    guard(command_buffer, "vkCmdSetLineStippleEnableEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdSetLineStippleEnableEXT", |recorder| {
+                let enable = stippled_line_enable != vk::FALSE;
+                crate::command::dynamic_state::set(
+                    recorder,
+                    DynamicState::LineStippleEnable { enable },
+                )
             })
         }
     })
@@ -4548,6 +4886,100 @@ unsafe extern "system" fn vkCreateHeadlessSurfaceEXT(
                 handle::create(crate::surface::create_headless_surface()?),
             )
             .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetLineStippleEXT(
+    command_buffer: vk::CommandBuffer,
+    _: u32,
+    _: u16,
+) {
+    guard(command_buffer, "vkCmdSetLineStippleEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdSetLineStippleEXT", |recorder| {
+                crate::command::dynamic_state::cmd_set_line_stipple(recorder)
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdDrawMultiEXT(
+    command_buffer: vk::CommandBuffer,
+    draw_count: u32,
+    p_vertex_info: *const vk::MultiDrawInfoEXT,
+    instance_count: u32,
+    first_instance: u32,
+    stride: u32,
+) {
+    guard(command_buffer, "vkCmdDrawMultiEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdDrawMultiEXT", |recorder| {
+                crate::command::draw::cmd_draw_multi(
+                    recorder,
+                    draw_count,
+                    p_vertex_info,
+                    instance_count,
+                    first_instance,
+                    stride,
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdDrawMultiIndexedEXT(
+    command_buffer: vk::CommandBuffer,
+    draw_count: u32,
+    p_index_info: *const vk::MultiDrawIndexedInfoEXT,
+    instance_count: u32,
+    first_instance: u32,
+    stride: u32,
+    p_vertex_offset: *const i32,
+) {
+    guard(command_buffer, "vkCmdDrawMultiIndexedEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdDrawMultiIndexedEXT", |recorder| {
+                crate::command::draw::cmd_draw_multi_indexed(
+                    recorder,
+                    draw_count,
+                    p_index_info,
+                    instance_count,
+                    first_instance,
+                    stride,
+                    p_vertex_offset,
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetVertexInputEXT(
+    command_buffer: vk::CommandBuffer,
+    vertex_binding_description_count: u32,
+    p_vertex_binding_descriptions: *const vk::VertexInputBindingDescription2EXT<'_>,
+    vertex_attribute_description_count: u32,
+    p_vertex_attribute_descriptions: *const vk::VertexInputAttributeDescription2EXT<'_>,
+) {
+    guard(command_buffer, "vkCmdSetVertexInputEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdSetVertexInputEXT", |recorder| {
+                crate::command::bind::cmd_set_vertex_input(
+                    recorder,
+                    valid::slice(
+                        p_vertex_binding_descriptions,
+                        vertex_binding_description_count,
+                    )?,
+                    valid::slice(
+                        p_vertex_attribute_descriptions,
+                        vertex_attribute_description_count,
+                    )?,
+                )
+            })
         }
     })
 }

@@ -7,12 +7,12 @@
 
 #![cfg(target_os = "linux")]
 
+mod error;
 mod shared_memory;
 mod wayland;
 mod x11;
 
-use driver::window::{WindowLost, WindowSystem, use_window_systems};
-use std::fmt::Display;
+use driver::window::{WindowSystem, use_window_systems};
 
 /// The window systems of this machine.
 static WINDOW_SYSTEMS: [&dyn WindowSystem; 3] = [&wayland::Wayland, &x11::Xcb, &x11::Xlib];
@@ -26,9 +26,4 @@ pub fn register() {
 pub fn entry() -> ash::Entry {
     register();
     driver::entry()
-}
-
-/// An error of a window system's as the loss of its window.
-fn lost(error: impl Display) -> WindowLost {
-    WindowLost(error.to_string())
 }

@@ -1,6 +1,6 @@
 //! Memory that a server of a window system maps too.
 
-use crate::lost;
+use crate::error::lost;
 use driver::window::WindowLost;
 use memmap2::MmapMut;
 use rustix::fs::{MemfdFlags, ftruncate, memfd_create};

@@ -3,7 +3,7 @@
 //! The connection is the application's. The driver has an event queue of its own on it, so that it hears of its own objects
 //! only, and the application of its own.
 
-use crate::lost;
+use crate::error::lost;
 use crate::shared_memory::SharedMemory;
 use driver::window::{
     Canvas, CanvasOptions, NativeWindow, PresentMode, Window, WindowLost, WindowSystem,

@@ -5,7 +5,7 @@
 //! or an error in its queue. So the display's refresh cannot be heard of; it is taken from RandR, and a clock paces pictures
 //! by it.
 
-use crate::lost;
+use crate::error::lost;
 use crate::shared_memory::SharedMemory;
 use driver::window::{
     Canvas, CanvasOptions, NativeWindow, PresentMode, Window, WindowLost, WindowSystem,

@@ -86,6 +86,7 @@ fn end_merged_draws_before(
     match command {
         Command::Draw(_)
         | Command::DrawIndirect(_)
+        | Command::DrawMulti(_)
         | Command::BindVertexBuffers { .. }
         | Command::BindIndexBuffer(_) => Ok(()),
         // What a vertex shader is bound to may change from draw to draw.
@@ -148,6 +149,12 @@ fn execute(
         }
         Command::SetCamera(camera) => state.camera = Some(**camera),
         Command::Draw(parameters) => draw(state, parameters, 0, execution)?,
+        Command::DrawMulti(draws) => {
+            for (index, parameters) in (0..).zip(draws) {
+                draw(state, parameters, index, execution)?;
+            }
+        }
+        Command::SetVertexInput(input) => state.set_vertex_input(input),
         Command::DrawIndirect(indirect) => draw_indirect(state, indirect, execution)?,
         Command::BindComputePipeline(pipeline) => state.compute_pipeline = Some(pipeline.clone()),
         Command::BindSets(bind) => state.sets_mut(bind.bind_point).bind(bind.first, &bind.sets),

@@ -7,6 +7,7 @@ use crate::descriptor::set::{DescriptorSet, Write};
 use crate::pipeline::compute::ComputePipeline;
 use crate::pipeline::dynamic_state::DynamicStates;
 use crate::pipeline::gaussian::{GaussianPipeline, GaussianSource};
+use crate::pipeline::state::VertexInput;
 use crate::pipeline::{GraphicsPipeline, PipelineKind};
 use simdevice::state::gaussian::Camera;
 use simdevice::state::{DrawState, Rect, Viewport};
@@ -27,6 +28,8 @@ pub(crate) struct State {
     pub(crate) push_constants: Vec<u8>,
     /// The vertex buffers by binding.
     pub(crate) vertex_buffers: Vec<Option<VertexBuffer>>,
+    /// Vertex bindings and attributes, where they are dynamic.
+    pub(crate) vertex_input: Option<Arc<VertexInput>>,
     /// The index buffer.
     pub(crate) index_buffer: Option<IndexBuffer>,
     /// Dynamic viewports.
@@ -84,6 +87,14 @@ impl State {
             self.push_constants.resize(range.end, 0);
         }
         self.push_constants[range].copy_from_slice(bytes);
+    }
+
+    /// Sets vertex bindings and attributes; the strides are theirs now.
+    pub(crate) fn set_vertex_input(&mut self, input: &Arc<VertexInput>) {
+        self.vertex_input = Some(Arc::clone(input));
+        for bound in self.vertex_buffers.iter_mut().flatten() {
+            bound.stride = None;
+        }
     }
 
     /// The vertex buffer bound at `binding`.
