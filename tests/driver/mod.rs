@@ -4,6 +4,7 @@
 mod addresses;
 mod depth_clip;
 mod descriptors;
+mod dynamic;
 mod limits;
 mod loader_door;
 mod multiview;
