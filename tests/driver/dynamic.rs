@@ -462,10 +462,11 @@ fn vertex_input_is_set() {
 fn several_draws_are_one_command() {
     let device = Device::new();
     let options = PipelineOptions {
-        vertex: "layout(location = 0) in vec4 position;
+        vertex: "#extension GL_ARB_shader_draw_parameters : require
+            layout(location = 0) in vec4 position;
             layout(location = 1) in vec4 color;
             layout(location = 0) out vec4 drawn;
-            void main() { gl_Position = position; drawn = vec4(color.rg, 0.25 * gl_DrawID, 1.0); }",
+            void main() { gl_Position = position; drawn = vec4(color.rg, 0.25 * gl_DrawIDARB, 1.0); }",
         fragment: Some(
             "layout(location = 0) in vec4 drawn;
             layout(location = 0) out vec4 color;

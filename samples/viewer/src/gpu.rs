@@ -1,6 +1,8 @@
 //! Everything of Vulkan: a device that presents to a window, its pipelines, and a frame. Objects go with the process, but for
 //! those that depend on the window's size.
 
+#![cfg_attr(rustfmt, rustfmt_skip)] // A step a line, so that a few screens show everything.
+
 use ash::vk::{self, AccessFlags as Access, ImageLayout as Layout, PipelineStageFlags as Stage};
 use gaurast::{gaussian_primitive_topology, vk::*};
 use gaurast_scene::{GaussianShape, Scene};
@@ -8,79 +10,44 @@ use glam::DMat4;
 use winit::raw_window_handle::{HasDisplayHandle, HasWindowHandle};
 use winit::window::Window;
 
-use crate::Outcome;
+/// What a function that can fail comes to.
+pub type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
 const DEPTH: vk::Format = vk::Format::D32_SFLOAT;
-/// Frames that are recorded while others are drawn.
-const FRAMES: usize = 2;
 /// Where spherical harmonics begin among the attributes.
 const FIRST_SH: u32 = 4;
 const VISIBLE: vk::MemoryPropertyFlags = vk::MemoryPropertyFlags::HOST_VISIBLE;
 
-/// A mesh's corner.
-#[repr(C)]
-#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-pub struct Vertex {
-    pub position: [f32; 3],
-    pub normal: [f32; 3],
-}
+/// A mesh's corner: its position and its normal.
+pub type Vertex = [[f32; 3]; 2];
 
 /// What a frame is seen with: a view that looks along +z, its projection, and the mesh's place.
-pub struct View {
-    pub world_to_view: DMat4,
-    pub projection: DMat4,
-    pub mesh: DMat4,
-}
+pub struct View { pub world_to_view: DMat4, pub projection: DMat4, pub mesh: DMat4 }
 
-/// Vertex buffers, and how many vertices they have.
-struct Vertices {
-    buffers: Vec<vk::Buffer>,
-    count: u32,
-}
-
-/// What is recorded while another frame is drawn.
-struct Frame {
-    commands: vk::CommandBuffer,
-    acquired: vk::Semaphore,
-    drawn: vk::Fence,
-}
+/// A pipeline, its vertex buffers, and how many vertices they have.
+type Draw = (vk::Pipeline, Vec<vk::Buffer>, u32);
 
 /// A swapchain with what its images need. The semaphores say that an image may be presented.
 #[derive(Default)]
 struct Swapchain {
-    raw: vk::SwapchainKHR,
-    size: [u32; 2],
+    raw: vk::SwapchainKHR, size: [u32; 2], is_outdated: bool,
     images: Vec<(vk::Image, vk::ImageView, vk::Semaphore)>,
     depth: (vk::Image, vk::ImageView, vk::DeviceMemory),
-    is_outdated: bool,
 }
 
 /// A device, what it draws, and where.
 pub struct Gpu {
-    physical: vk::PhysicalDevice,
-    surfaces: ash::khr::surface::Instance,
-    surface: vk::SurfaceKHR,
-    device: ash::Device,
-    swapchains: ash::khr::swapchain::Device,
-    extension: gaussian_primitive_topology::Device,
-    types: vk::PhysicalDeviceMemoryProperties,
-    queue: vk::Queue,
-    format: vk::SurfaceFormatKHR,
-    mode: vk::PresentModeKHR,
-    layout: vk::PipelineLayout,
-    /// The pipelines of the mesh and of the Gaussians.
-    pipelines: [vk::Pipeline; 2],
-    mesh: Vertices,
-    gaussians: Vertices,
-    frames: Vec<Frame>,
-    next: usize,
-    swapchain: Swapchain,
-    _instance: ash::Instance,
-    _entry: ash::Entry,
+    physical: vk::PhysicalDevice, device: ash::Device, queue: vk::Queue, types: vk::PhysicalDeviceMemoryProperties,
+    surfaces: ash::khr::surface::Instance, surface: vk::SurfaceKHR,
+    swapchains: ash::khr::swapchain::Device, format: vk::SurfaceFormatKHR, mode: vk::PresentModeKHR,
+    extension: gaussian_primitive_topology::Device, layout: vk::PipelineLayout,
+    /// The mesh, and then the Gaussians.
+    draws: Vec<Draw>,
+    commands: vk::CommandBuffer, acquired: vk::Semaphore, drawn: vk::Fence, swapchain: Swapchain,
+    _instance: ash::Instance, _entry: ash::Entry,
 }
 
 // SAFETY throughout: handles are used while they live, structures are valid, and commands are in order.
-#[rustfmt::skip] // A step a line, so that a screen or two show everything.
 impl Gpu {
     pub fn new(entry: ash::Entry, window: &Window, mode: vk::PresentModeKHR, scene: &Scene, mesh: &[Vertex]) -> Outcome<Self> {
         // SAFETY: see above; the window outlives this.
@@ -117,28 +84,26 @@ impl Gpu {
             let layout = device.create_pipeline_layout(&vk::PipelineLayoutCreateInfo::default().push_constant_ranges(&ranges), None)?;
             let reset = vk::CommandPoolCreateFlags::RESET_COMMAND_BUFFER;
             let pool = device.create_command_pool(&vk::CommandPoolCreateInfo::default().flags(reset), None)?;
-            let info = vk::CommandBufferAllocateInfo::default().command_pool(pool).command_buffer_count(FRAMES as u32);
-            let frames = device.allocate_command_buffers(&info)?.into_iter().map(|commands| {
-                let signaled = vk::FenceCreateInfo::default().flags(vk::FenceCreateFlags::SIGNALED);
-                let acquired = device.create_semaphore(&Default::default(), None)?;
-                Ok(Frame { commands, acquired, drawn: device.create_fence(&signaled, None)? })
-            }).collect::<Result<_, vk::Result>>()?;
-            let empty = || Vertices { buffers: Vec::new(), count: 0 };
+            let info = vk::CommandBufferAllocateInfo::default().command_pool(pool).command_buffer_count(1);
+            let signaled = vk::FenceCreateInfo::default().flags(vk::FenceCreateFlags::SIGNALED);
             let mut gpu = Self {
-                physical, surface, format, mode, layout, frames, surfaces,
+                physical, surface, format, mode, layout, surfaces,
+                commands: device.allocate_command_buffers(&info)?[0],
+                acquired: device.create_semaphore(&Default::default(), None)?,
+                drawn: device.create_fence(&signaled, None)?,
                 swapchains: ash::khr::swapchain::Device::new(&instance, &device),
                 extension: gaussian_primitive_topology::Device::new(&instance, &device),
                 types: instance.get_physical_device_memory_properties(physical),
                 queue: device.get_device_queue(0, 0),
-                pipelines: Default::default(), mesh: empty(), gaussians: empty(),
-                next: 0, swapchain: Swapchain { is_outdated: true, ..Default::default() },
+                draws: Vec::new(), swapchain: Swapchain { is_outdated: true, ..Default::default() },
                 device, _instance: instance, _entry: entry,
             };
-            gpu.mesh = Vertices { buffers: vec![gpu.vertex_buffer(bytemuck::cast_slice(mesh))?], count: mesh.len() as u32 };
             let parts = [bytemuck::cast_slice(scene.positions()), bytemuck::cast_slice(scene.shapes()), bytemuck::cast_slice(scene.sh())];
             let buffers = parts.iter().map(|bytes| gpu.vertex_buffer(bytes)).collect::<Outcome<_>>()?;
-            gpu.gaussians = Vertices { buffers, count: scene.len() as u32 };
-            gpu.pipelines = [gpu.mesh_pipeline()?, gpu.gaussian_pipeline(scene)?];
+            gpu.draws = vec![
+                (gpu.mesh_pipeline()?, vec![gpu.vertex_buffer(bytemuck::cast_slice(mesh))?], mesh.len() as u32),
+                (gpu.gaussian_pipeline(scene)?, buffers, scene.len() as u32),
+            ];
             Ok(gpu)
         }
     }
@@ -174,7 +139,7 @@ impl Gpu {
             let (staging, memory) = create(vk::BufferUsageFlags::TRANSFER_SRC, VISIBLE | vk::MemoryPropertyFlags::HOST_COHERENT)?;
             let mapped = device.map_memory(memory, 0, vk::WHOLE_SIZE, Default::default())?;
             mapped.cast::<u8>().copy_from(bytes.as_ptr(), bytes.len());
-            let commands = [self.frames[0].commands];
+            let commands = [self.commands];
             device.begin_command_buffer(commands[0], &Default::default())?;
             device.cmd_copy_buffer(commands[0], staging, buffer, &[vk::BufferCopy::default().size(bytes.len().max(4) as u64)]);
             device.end_command_buffer(commands[0])?;
@@ -300,24 +265,24 @@ impl Gpu {
     /// Draws and presents a frame to a window of a size.
     pub fn draw(&mut self, size: [u32; 2], view: &View) -> Outcome<()> {
         if self.swapchain.is_outdated || self.swapchain.size != size { self.rebuild(size)?; }
-        let (device, chain, frame) = (&self.device, &self.swapchain, &self.frames[self.next]);
+        let (device, chain) = (&self.device, &self.swapchain);
         // SAFETY: see above.
         unsafe {
-            device.wait_for_fences(&[frame.drawn], true, u64::MAX)?;
-            let index = match self.swapchains.acquire_next_image(chain.raw, u64::MAX, frame.acquired, vk::Fence::null()) {
+            device.wait_for_fences(&[self.drawn], true, u64::MAX)?;
+            let index = match self.swapchains.acquire_next_image(chain.raw, u64::MAX, self.acquired, vk::Fence::null()) {
                 Ok((index, _)) => index,
                 // The next frame has a new one.
                 Err(vk::Result::ERROR_OUT_OF_DATE_KHR) => { self.swapchain.is_outdated = true; return Ok(()); }
                 Err(error) => return Err(error.into()),
             };
-            device.reset_fences(&[frame.drawn])?;
+            device.reset_fences(&[self.drawn])?;
             let (image, target, drawn) = chain.images[index as usize];
-            self.record(frame.commands, image, target, view)?;
-            let (waits, stages) = ([frame.acquired], [Stage::COLOR_ATTACHMENT_OUTPUT]);
-            let (commands, signals) = ([frame.commands], [drawn]);
+            self.record(self.commands, image, target, view)?;
+            let (waits, stages) = ([self.acquired], [Stage::COLOR_ATTACHMENT_OUTPUT]);
+            let (commands, signals) = ([self.commands], [drawn]);
             let submit = vk::SubmitInfo::default().wait_semaphores(&waits).wait_dst_stage_mask(&stages)
                 .command_buffers(&commands).signal_semaphores(&signals);
-            device.queue_submit(self.queue, &[submit], frame.drawn)?;
+            device.queue_submit(self.queue, &[submit], self.drawn)?;
             let (raws, indices) = ([chain.raw], [index]);
             let info = vk::PresentInfoKHR::default().wait_semaphores(&signals).swapchains(&raws).image_indices(&indices);
             self.swapchain.is_outdated = match self.swapchains.queue_present(self.queue, &info) {
@@ -326,7 +291,6 @@ impl Gpu {
                 Err(error) => return Err(error.into()),
             };
         }
-        self.next = (self.next + 1) % FRAMES;
         Ok(())
     }
 
@@ -362,10 +326,10 @@ impl Gpu {
             device.cmd_set_scissor(c, 0, &[area]);
             self.extension.cmd_set_gaussian_camera(c, &camera);
             device.cmd_push_constants(c, self.layout, vk::ShaderStageFlags::VERTEX, 0, bytemuck::bytes_of(&to_clip));
-            for (pipeline, vertices) in self.pipelines.iter().zip([&self.mesh, &self.gaussians]) {
+            for (pipeline, buffers, count) in &self.draws {
                 device.cmd_bind_pipeline(c, vk::PipelineBindPoint::GRAPHICS, *pipeline);
-                device.cmd_bind_vertex_buffers(c, 0, &vertices.buffers, &[0; 3][..vertices.buffers.len()]);
-                device.cmd_draw(c, vertices.count, 1, 0, 0);
+                device.cmd_bind_vertex_buffers(c, 0, buffers, &[0; 3][..buffers.len()]);
+                device.cmd_draw(c, *count, 1, 0, 0);
             }
             device.cmd_end_rendering(c);
             device.cmd_pipeline_barrier(c, drawn, Stage::BOTTOM_OF_PIPE, no, &[], &[], &[end]);
@@ -376,8 +340,7 @@ impl Gpu {
     /// Waits until everything is drawn.
     pub fn wait(&self) -> Outcome<()> {
         // SAFETY: see above.
-        unsafe { self.device.device_wait_idle()?; }
-        Ok(())
+        Ok(unsafe { self.device.device_wait_idle() }?)
     }
 }
 
@@ -394,17 +357,9 @@ impl Drop for Gpu {
 }
 
 fn attribute(location: u32, binding: u32, offset: usize) -> vk::VertexInputAttributeDescription {
-    vk::VertexInputAttributeDescription {
-        location,
-        binding,
-        format: vk::Format::R32G32B32_SFLOAT,
-        offset: offset as u32,
-    }
+    vk::VertexInputAttributeDescription { location, binding, format: vk::Format::R32G32B32_SFLOAT, offset: offset as u32 }
 }
 
 fn whole(aspect: vk::ImageAspectFlags) -> vk::ImageSubresourceRange {
-    vk::ImageSubresourceRange::default()
-        .aspect_mask(aspect)
-        .level_count(1)
-        .layer_count(1)
+    vk::ImageSubresourceRange::default().aspect_mask(aspect).level_count(1).layer_count(1)
 }
