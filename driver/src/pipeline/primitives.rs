@@ -59,6 +59,9 @@ impl PrimitivePipeline {
     /// # Errors
     /// An [`Error`] that names the valid usage broken, or the feature that the device lacks.
     pub(crate) fn new(device: &Device, info: &GraphicsState) -> Result<Self, Error> {
+        if !device.features().primitive_topology_list_restart {
+            info.require_no_list_restart()?;
+        }
         let fixed = FixedFunctionState::new(info)?;
         let (dynamic, viewports, scissors) = dynamic(info)?;
         let layout = info.layout.ok_or_else(|| {

@@ -231,6 +231,26 @@ impl<'a> GraphicsState<'a> {
         .all(|state| self.is_dynamic(state))
     }
 
+    /// Fails if an index is to restart a list, which takes the feature `primitiveTopologyListRestart`.
+    ///
+    /// # Errors
+    /// [`Error::InvalidUsage`].
+    pub(super) fn require_no_list_restart(&self) -> Result<(), Error> {
+        use vk::PrimitiveTopology as T;
+        let topology = self.vertex_input.topology;
+        let is_list = matches!(topology, T::POINT_LIST | T::LINE_LIST | T::TRIANGLE_LIST);
+        if !self.vertex_input.primitive_restart
+            || !is_list
+            || self.is_dynamic(vk::DynamicState::PRIMITIVE_TOPOLOGY)
+        {
+            return Ok(());
+        }
+        Err(Error::usage(
+            "VUID-VkPipelineInputAssemblyStateCreateInfo-topology-06252",
+            format!("primitiveRestartEnable is VK_TRUE, but {topology:?} has no restart"),
+        ))
+    }
+
     /// The width of lines. Pipelines that draw none often leave it at zero.
     fn line_width(&self) -> f32 {
         let width = self.pre_rasterization.rasterization.line_width;
@@ -718,20 +738,6 @@ impl FixedFunctionState {
             ),
         ];
         require_all(&needs)?;
-        let is_list = matches!(
-            topology,
-            Topology::PointList | Topology::LineList | Topology::TriangleList
-        );
-        if info.vertex_input.primitive_restart
-            && is_list
-            && !SUPPORTED.primitive_topology_list_restart
-            && !info.is_dynamic(vk::DynamicState::PRIMITIVE_TOPOLOGY)
-        {
-            return Err(Error::usage(
-                "VUID-VkPipelineInputAssemblyStateCreateInfo-topology-06252",
-                format!("primitiveRestartEnable is VK_TRUE, but {topology:?} has no restart"),
-            ));
-        }
         let draw = DrawState {
             topology,
             primitive_restart: info.vertex_input.primitive_restart,
