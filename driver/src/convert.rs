@@ -5,8 +5,8 @@ use ash::vk;
 use simdevice::Format;
 use simdevice::format::{Aspect, Channel, ClearValue, Numeric};
 use simdevice::state::{
-    BlendEquation, BlendFactor, BlendOp, BlendState, CompareOp, LogicOp, PolygonMode, Rect,
-    ResolveMode, StencilFace, StencilOp, Topology, Viewport,
+    BlendEquation, BlendFactor, BlendOp, CompareOp, LogicOp, PolygonMode, Rect, ResolveMode,
+    StencilFace, StencilOp, Topology, Viewport,
 };
 use simdevice::texture::{
     AddressMode, BorderColor, ComponentSwizzle, Filter, IDENTITY, MipmapMode, Reduction, Swizzle,
@@ -180,40 +180,37 @@ pub(crate) fn logic_op(op: vk::LogicOp) -> Result<LogicOp, Error> {
     }
 }
 
-/// One attachment's blend state for the device.
+/// The equations of an attachment's colour and alpha.
 ///
 /// # Errors
 /// An [`Error`] for factors and operations that Vulkan does not have.
-pub(crate) fn blend_state(
+pub(crate) fn blend_equations(
     state: &vk::PipelineColorBlendAttachmentState,
-) -> Result<BlendState, Error> {
-    let equations = if state.blend_enable == vk::FALSE {
-        None
-    } else {
-        let color = equation(
-            state.src_color_blend_factor,
-            state.dst_color_blend_factor,
-            state.color_blend_op,
-            [
-                "VUID-VkPipelineColorBlendAttachmentState-srcColorBlendFactor-parameter",
-                "VUID-VkPipelineColorBlendAttachmentState-dstColorBlendFactor-parameter",
-            ],
-        )?;
-        let alpha = equation(
-            state.src_alpha_blend_factor,
-            state.dst_alpha_blend_factor,
-            state.alpha_blend_op,
-            [
-                "VUID-VkPipelineColorBlendAttachmentState-srcAlphaBlendFactor-parameter",
-                "VUID-VkPipelineColorBlendAttachmentState-dstAlphaBlendFactor-parameter",
-            ],
-        )?;
-        Some((color, alpha))
-    };
-    Ok(BlendState {
-        equations,
-        write_mask: (state.color_write_mask.as_raw() & 0xf) as u8,
-    })
+) -> Result<(BlendEquation, BlendEquation), Error> {
+    let color = equation(
+        state.src_color_blend_factor,
+        state.dst_color_blend_factor,
+        state.color_blend_op,
+        [
+            "VUID-VkPipelineColorBlendAttachmentState-srcColorBlendFactor-parameter",
+            "VUID-VkPipelineColorBlendAttachmentState-dstColorBlendFactor-parameter",
+        ],
+    )?;
+    let alpha = equation(
+        state.src_alpha_blend_factor,
+        state.dst_alpha_blend_factor,
+        state.alpha_blend_op,
+        [
+            "VUID-VkPipelineColorBlendAttachmentState-srcAlphaBlendFactor-parameter",
+            "VUID-VkPipelineColorBlendAttachmentState-dstAlphaBlendFactor-parameter",
+        ],
+    )?;
+    Ok((color, alpha))
+}
+
+/// The bits of a mask of components: 0 to 3 are red, green, blue and alpha.
+pub(crate) fn write_mask(mask: vk::ColorComponentFlags) -> u8 {
+    (mask.as_raw() & 0xf) as u8
 }
 
 fn equation(

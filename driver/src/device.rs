@@ -443,11 +443,19 @@ mod tests {
             count::<vk::PhysicalDeviceDepthClipEnableFeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceRobustness2FeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceWorkgroupMemoryExplicitLayoutFeaturesKHR<'_>>(),
+            count::<vk::PhysicalDeviceColorWriteEnableFeaturesEXT<'_>>(),
+            count::<vk::PhysicalDeviceExtendedDynamicState3FeaturesEXT<'_>>(),
+            count::<vk::PhysicalDeviceLineRasterizationFeaturesKHR<'_>>(),
+            count::<vk::PhysicalDeviceMultiDrawFeaturesEXT<'_>>(),
+            count::<vk::PhysicalDevicePrimitiveTopologyListRestartFeaturesEXT<'_>>(),
+            count::<vk::PhysicalDeviceVertexInputDynamicStateFeaturesEXT<'_>>(),
             count::<PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>>(),
         ];
         assert_eq!(
             counts,
-            [38, 7, 43, 14, 1, 1, 1, 1, 1, 1, 2, 2, 2, 2, 1, 3, 4, 19]
+            [
+                38, 7, 43, 14, 1, 1, 1, 2, 1, 1, 2, 2, 2, 2, 1, 3, 4, 1, 13, 1, 1, 1, 1, 19
+            ]
         );
         assert_eq!(count_of(&SUPPORTED), counts.iter().sum::<usize>());
     }

@@ -10,6 +10,7 @@ use crate::abi::handle::{self, Reporter, objects};
 use crate::abi::valid::{self, Structures};
 use crate::convert;
 use crate::registry::extensions::{DEVICE, Extension, INSTANCE};
+use crate::window;
 use ash::vk;
 use std::ffi::{CStr, CString, c_void};
 use std::sync::{Arc, LazyLock, PoisonError, RwLock, Weak};
@@ -22,6 +23,14 @@ pub(crate) fn device_extension_names() -> &'static [&'static CStr] {
     static NAMES: LazyLock<Vec<&'static CStr>> =
         LazyLock::new(|| DEVICE.iter().map(|&(name, _)| name).collect());
     &NAMES
+}
+
+/// The instance extensions: those of window systems only where there are such.
+fn instance_extensions() -> Vec<Extension> {
+    let listed = INSTANCE.iter().copied();
+    listed
+        .filter(|(name, _)| window::is_available(name))
+        .collect()
 }
 
 /// The requested extensions as the driver's own names.
@@ -95,7 +104,7 @@ impl Instance {
     /// # Errors
     /// [`Error::ExtensionNotPresent`].
     pub(crate) fn new(api_version: u32, extensions: &[&CStr]) -> Result<Arc<Self>, Error> {
-        let extensions = resolve_extensions(INSTANCE, extensions)?;
+        let extensions = resolve_extensions(&instance_extensions(), extensions)?;
         let api_version = match api_version {
             0 => vk::API_VERSION_1_0,
             version => version.min(API_VERSION),
@@ -316,7 +325,7 @@ pub(crate) fn enumerate_instance_extension_properties(
     layer_name: Option<&CStr>,
 ) -> Result<Vec<vk::ExtensionProperties>, Error> {
     match layer_name {
-        None => Ok(extension_properties(INSTANCE)),
+        None => Ok(extension_properties(&instance_extensions())),
         Some(layer) => Err(Error::LayerNotPresent(layer.to_string_lossy().into_owned())),
     }
 }

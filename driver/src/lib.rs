@@ -24,7 +24,10 @@ mod registry;
 mod render_pass;
 mod resource;
 mod shader_module;
+mod surface;
+mod swapchain;
 mod sync;
+pub mod window;
 
 pub use abi::handle::live_handles;
 

@@ -10,8 +10,8 @@ use std::ffi::c_char;
 /// The newest version of the loader's interface that the driver knows.
 const NEWEST_INTERFACE: u32 = 7;
 
-/// The oldest that it accepts: from 2 on, versions are negotiated.
-const OLDEST_INTERFACE: u32 = 2;
+/// The oldest that it accepts: from 3 on, surfaces are the driver's own objects.
+const OLDEST_INTERFACE: u32 = 3;
 
 /// Agrees with the loader on a version of their interface.
 ///

@@ -4,10 +4,15 @@
 mod addresses;
 mod depth_clip;
 mod descriptors;
+mod dynamic;
 mod limits;
 mod loader_door;
 mod multiview;
 mod pipelines;
+mod presentation;
 mod queues;
 mod robustness;
 mod samplers;
+mod window;
+#[cfg(target_os = "linux")]
+mod x11;

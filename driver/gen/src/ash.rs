@@ -218,6 +218,8 @@ fn with_paths(tokens: TokenStream) -> TokenStream {
 fn with_path(name: &str) -> String {
     if name.starts_with("c_") {
         format!("std::ffi::{name}")
+    } else if name.starts_with("xcb_") || name.starts_with("wl_") {
+        format!("vk::{name}")
     } else if !name.starts_with(|c: char| c.is_ascii_uppercase()) || name == "Option" {
         name.to_owned()
     } else if name.ends_with("GAURAST") {

@@ -21,6 +21,8 @@ pub unsafe extern "system" fn vk_icdNegotiateLoaderICDInterfaceVersion(
     // The loader's process has no other logger; if it does have one, that one stays.
     let environment = env_logger::Env::new().filter_or("GAURAST_LOG", "warn");
     let _ = env_logger::Builder::from_env(environment).try_init();
+    // The loader negotiates before it asks for any extension.
+    window::register();
     // SAFETY: the caller's promise.
     unsafe { loader::negotiate_interface_version(version) }
 }

@@ -1,5 +1,6 @@
 //! What can go wrong in a command, and the one place where it becomes a `VkResult`.
 
+use crate::window::WindowLost;
 use ash::vk;
 use std::borrow::Cow;
 
@@ -45,6 +46,12 @@ pub(crate) enum Error {
     /// The device is lost: a submission panicked.
     #[error("the device is lost: {0}")]
     DeviceLost(String),
+    /// A window that can't be shown to any more.
+    #[error(transparent)]
+    SurfaceLost(WindowLost),
+    /// A window that a swapchain presents to already.
+    #[error("another swapchain presents to the window")]
+    NativeWindowInUse,
     /// Memory that can't be mapped.
     #[error("memory cannot be mapped: {0}")]
     MemoryMapFailed(String),
@@ -105,6 +112,8 @@ impl Error {
             Self::InvalidShader(_) => vk::Result::ERROR_INVALID_SHADER_NV,
             Self::InitializationFailed(_) => vk::Result::ERROR_INITIALIZATION_FAILED,
             Self::DeviceLost(_) => vk::Result::ERROR_DEVICE_LOST,
+            Self::SurfaceLost(_) => vk::Result::ERROR_SURFACE_LOST_KHR,
+            Self::NativeWindowInUse => vk::Result::ERROR_NATIVE_WINDOW_IN_USE_KHR,
             Self::MemoryMapFailed(_) => vk::Result::ERROR_MEMORY_MAP_FAILED,
             Self::LayerNotPresent(_) => vk::Result::ERROR_LAYER_NOT_PRESENT,
             Self::ExtensionNotPresent(_) => vk::Result::ERROR_EXTENSION_NOT_PRESENT,

@@ -9,6 +9,7 @@ use crate::descriptor::set::{self, UpdateTemplate};
 use crate::physical_device::limits;
 use crate::pipeline::Pipeline;
 use crate::pipeline::layout::PipelineLayout;
+use crate::pipeline::state::VertexInput;
 use crate::resource::buffer::{Buffer, BufferRules};
 use ash::vk;
 use simdevice::Allocation;
@@ -85,6 +86,42 @@ const VERTEX_BUFFERS: BufferRules = BufferRules {
     memory: "VUID-vkCmdBindVertexBuffers-pBuffers-00628",
     range: "VUID-vkCmdBindVertexBuffers-pOffsets-00626",
 };
+
+#[doc(alias = "vkCmdSetVertexInputEXT")]
+pub(crate) fn cmd_set_vertex_input(
+    recorder: &mut Recorder,
+    vertex_binding_descriptions: &[vk::VertexInputBindingDescription2EXT<'_>],
+    vertex_attribute_descriptions: &[vk::VertexInputAttributeDescription2EXT<'_>],
+) -> Result<(), Error> {
+    let bindings = vertex_binding_descriptions.iter();
+    let input = VertexInput {
+        bindings: bindings
+            .clone()
+            .map(|given| vk::VertexInputBindingDescription {
+                binding: given.binding,
+                stride: given.stride,
+                input_rate: given.input_rate,
+            })
+            .collect(),
+        divisors: bindings
+            .map(|given| vk::VertexInputBindingDivisorDescriptionKHR {
+                binding: given.binding,
+                divisor: given.divisor,
+            })
+            .collect(),
+        attributes: vertex_attribute_descriptions
+            .iter()
+            .map(|given| vk::VertexInputAttributeDescription {
+                location: given.location,
+                binding: given.binding,
+                format: given.format,
+                offset: given.offset,
+            })
+            .collect(),
+    };
+    recorder.push(Command::SetVertexInput(Arc::new(input)));
+    Ok(())
+}
 
 #[doc(alias = "vkCmdBindIndexBuffer")]
 pub(crate) fn cmd_bind_index_buffer(

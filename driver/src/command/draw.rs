@@ -3,6 +3,7 @@
 use super::buffer::Recorder;
 use super::{Command, DrawIndirect, DrawParameters};
 use crate::abi::error::Error;
+use crate::abi::valid;
 use crate::resource::buffer::{Buffer, BufferRules};
 use ash::vk;
 use std::sync::Arc;
@@ -62,6 +63,87 @@ pub(crate) fn cmd_draw_indexed(
         instance_count,
     }));
     Ok(())
+}
+
+/// The elements of an array that lie `stride` bytes apart.
+///
+/// # Safety
+/// There are `count` of them at the pointer.
+unsafe fn strided<T: Copy>(first: *const T, count: u32, stride: u32) -> Result<Vec<T>, Error> {
+    if first.is_null() && count > 0 {
+        return Err(Error::NullPointer {
+            what: std::any::type_name::<T>(),
+        });
+    }
+    let element = |index: u32| {
+        // SAFETY: the caller's promise.
+        unsafe {
+            first
+                .byte_add(index as usize * stride as usize)
+                .read_unaligned()
+        }
+    };
+    Ok(simdevice::host::collect((0..count).map(element)))
+}
+
+/// Records draws of which each knows its number.
+fn draw_multi(recorder: &mut Recorder, draws: Vec<DrawParameters>) -> Result<(), Error> {
+    recorder.require_pass()?;
+    recorder.push(Command::DrawMulti(draws));
+    Ok(())
+}
+
+/// # Safety
+/// There are as many infos as are said, a stride apart.
+#[doc(alias = "vkCmdDrawMultiEXT")]
+pub(crate) unsafe fn cmd_draw_multi(
+    recorder: &mut Recorder,
+    draw_count: u32,
+    vertex_info: *const vk::MultiDrawInfoEXT,
+    instance_count: u32,
+    first_instance: u32,
+    stride: u32,
+) -> Result<(), Error> {
+    // SAFETY: the caller's promise.
+    let infos = unsafe { strided(vertex_info, draw_count, stride)? };
+    let draws = infos.into_iter().map(|info| DrawParameters {
+        vertex_offset: None,
+        first: info.first_vertex,
+        count: info.vertex_count,
+        first_instance,
+        instance_count,
+    });
+    draw_multi(recorder, draws.collect())
+}
+
+/// # Safety
+/// As [`cmd_draw_multi`].
+#[doc(alias = "vkCmdDrawMultiIndexedEXT")]
+pub(crate) unsafe fn cmd_draw_multi_indexed(
+    recorder: &mut Recorder,
+    draw_count: u32,
+    index_info: *const vk::MultiDrawIndexedInfoEXT,
+    instance_count: u32,
+    first_instance: u32,
+    stride: u32,
+    vertex_offset: *const i32,
+) -> Result<(), Error> {
+    // SAFETY: the caller's promise.
+    let (infos, offset) = unsafe {
+        (
+            strided(index_info, draw_count, stride)?,
+            valid::optional(vertex_offset),
+        )
+    };
+    let draws = infos.into_iter().map(|info| DrawParameters {
+        // One offset for all goes before those of each.
+        vertex_offset: Some(offset.copied().unwrap_or(info.vertex_offset)),
+        first: info.first_index,
+        count: info.index_count,
+        first_instance,
+        instance_count,
+    });
+    draw_multi(recorder, draws.collect())
 }
 
 #[doc(alias = "vkCmdDrawIndirect")]

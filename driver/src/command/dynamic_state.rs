@@ -111,6 +111,127 @@ pub(crate) fn cmd_set_depth_compare_op(
     set(recorder, DynamicState::DepthCompareOp { op })
 }
 
+#[doc(alias = "vkCmdSetPolygonModeEXT")]
+pub(crate) fn cmd_set_polygon_mode(
+    recorder: &mut Recorder,
+    polygon_mode: vk::PolygonMode,
+) -> Result<(), Error> {
+    let mode = convert::polygon_mode(polygon_mode)?;
+    set(recorder, DynamicState::PolygonMode { mode })
+}
+
+#[doc(alias = "vkCmdSetLogicOpEXT")]
+pub(crate) fn cmd_set_logic_op(
+    recorder: &mut Recorder,
+    logic_op: vk::LogicOp,
+) -> Result<(), Error> {
+    let op = convert::logic_op(logic_op)?;
+    set(recorder, DynamicState::LogicOp { op })
+}
+
+/// No pixel has more samples than a word of the mask has bits.
+#[doc(alias = "vkCmdSetSampleMaskEXT")]
+pub(crate) fn cmd_set_sample_mask(
+    recorder: &mut Recorder,
+    sample_mask: Option<&vk::SampleMask>,
+) -> Result<(), Error> {
+    let mask = sample_mask.copied().unwrap_or(u32::MAX);
+    set(recorder, DynamicState::SampleMask { mask })
+}
+
+/// Lines have no stipple, whose pattern is of no account so.
+#[doc(alias = "vkCmdSetLineStippleEXT")]
+pub(crate) fn cmd_set_line_stipple(_recorder: &mut Recorder) -> Result<(), Error> {
+    Ok(())
+}
+
+#[doc(alias = "vkCmdSetColorBlendEnableEXT")]
+pub(crate) fn cmd_set_color_blend_enable(
+    recorder: &mut Recorder,
+    first_attachment: u32,
+    color_blend_enables: &[vk::Bool32],
+) -> Result<(), Error> {
+    set_attachments(
+        recorder,
+        first_attachment,
+        color_blend_enables,
+        |attachment, &enable| {
+            let enable = enable != vk::FALSE;
+            Ok(DynamicState::ColorBlendEnable { attachment, enable })
+        },
+    )
+}
+
+#[doc(alias = "vkCmdSetColorBlendEquationEXT")]
+pub(crate) fn cmd_set_color_blend_equation(
+    recorder: &mut Recorder,
+    first_attachment: u32,
+    color_blend_equations: &[vk::ColorBlendEquationEXT],
+) -> Result<(), Error> {
+    set_attachments(
+        recorder,
+        first_attachment,
+        color_blend_equations,
+        |attachment, given| {
+            let state = vk::PipelineColorBlendAttachmentState {
+                src_color_blend_factor: given.src_color_blend_factor,
+                dst_color_blend_factor: given.dst_color_blend_factor,
+                color_blend_op: given.color_blend_op,
+                src_alpha_blend_factor: given.src_alpha_blend_factor,
+                dst_alpha_blend_factor: given.dst_alpha_blend_factor,
+                alpha_blend_op: given.alpha_blend_op,
+                ..Default::default()
+            };
+            let equations = convert::blend_equations(&state)?;
+            Ok(DynamicState::ColorBlendEquation {
+                attachment,
+                equations,
+            })
+        },
+    )
+}
+
+#[doc(alias = "vkCmdSetColorWriteMaskEXT")]
+pub(crate) fn cmd_set_color_write_mask(
+    recorder: &mut Recorder,
+    first_attachment: u32,
+    color_write_masks: &[vk::ColorComponentFlags],
+) -> Result<(), Error> {
+    set_attachments(
+        recorder,
+        first_attachment,
+        color_write_masks,
+        |attachment, &mask| {
+            let mask = convert::write_mask(mask);
+            Ok(DynamicState::ColorWriteMask { attachment, mask })
+        },
+    )
+}
+
+#[doc(alias = "vkCmdSetColorWriteEnableEXT")]
+pub(crate) fn cmd_set_color_write_enable(
+    recorder: &mut Recorder,
+    color_write_enables: &[vk::Bool32],
+) -> Result<(), Error> {
+    set_attachments(recorder, 0, color_write_enables, |attachment, &enable| {
+        let enable = enable != vk::FALSE;
+        Ok(DynamicState::ColorWriteEnable { attachment, enable })
+    })
+}
+
+/// Records a state of each of some colour attachments.
+fn set_attachments<T>(
+    recorder: &mut Recorder,
+    first: u32,
+    values: &[T],
+    state: impl Fn(usize, &T) -> Result<DynamicState, Error>,
+) -> Result<(), Error> {
+    for (attachment, value) in (first as usize..).zip(values) {
+        set(recorder, state(attachment, value)?)?;
+    }
+    Ok(())
+}
+
 #[doc(alias = "vkCmdSetViewport")]
 pub(crate) fn cmd_set_viewport(
     recorder: &mut Recorder,

@@ -27,6 +27,7 @@ use crate::descriptor::set::{Descriptor, DescriptorSet, Write};
 use crate::pipeline::GraphicsPipeline;
 use crate::pipeline::compute::ComputePipeline;
 use crate::pipeline::dynamic_state::DynamicState;
+use crate::pipeline::state::VertexInput;
 use crate::query_pool::QueryPool;
 use crate::sync::Event;
 use ash::vk;
@@ -96,6 +97,10 @@ pub(crate) enum Command {
     EndGaussianSet,
     /// `vkCmdDraw` and `vkCmdDrawIndexed`.
     Draw(DrawParameters),
+    /// `vkCmdDrawMultiEXT` and `vkCmdDrawMultiIndexedEXT`.
+    DrawMulti(Vec<DrawParameters>),
+    /// `vkCmdSetVertexInputEXT`.
+    SetVertexInput(Arc<VertexInput>),
     /// `vkCmdDrawIndirect`, `vkCmdDrawIndexedIndirect` and their forms with a count: the draws are read when they
     /// execute.
     DrawIndirect(DrawIndirect),

@@ -86,7 +86,14 @@ fn execute_batch(batch: Batch, execution: &mut Execution<'_>) -> Result<(), Erro
 }
 
 /// Hands batches to the queue's thread.
-fn enqueue(queue: &Queue, batches: Vec<Batch>, fence: Option<&Arc<Fence>>) -> Result<(), Error> {
+///
+/// # Errors
+/// [`Error::DeviceLost`].
+pub(crate) fn enqueue(
+    queue: &Queue,
+    batches: Vec<Batch>,
+    fence: Option<&Arc<Fence>>,
+) -> Result<(), Error> {
     let fence = fence.cloned();
     let submission = Submission {
         batches,

@@ -258,6 +258,9 @@ static ROWS: &[Command] = rows! {
         vkCmdSetDepthBiasEnable: vk::PFN_vkCmdSetDepthBiasEnable = vkCmdSetDepthBiasEnable;
         vkCmdSetPrimitiveRestartEnable: vk::PFN_vkCmdSetPrimitiveRestartEnable = vkCmdSetPrimitiveRestartEnable;
     }
+    Device, DeviceExtension(&[c"VK_EXT_color_write_enable"]) => {
+        vkCmdSetColorWriteEnableEXT: vk::PFN_vkCmdSetColorWriteEnableEXT = vkCmdSetColorWriteEnableEXT;
+    }
     Device, InstanceExtension(&[c"VK_EXT_debug_utils"]) => {
         vkSetDebugUtilsObjectNameEXT: vk::PFN_vkSetDebugUtilsObjectNameEXT = vkSetDebugUtilsObjectNameEXT;
         vkSetDebugUtilsObjectTagEXT: vk::PFN_vkSetDebugUtilsObjectTagEXT = vkSetDebugUtilsObjectTagEXT;
@@ -294,8 +297,35 @@ static ROWS: &[Command] = rows! {
         vkCmdSetLogicOpEXT: vk::PFN_vkCmdSetLogicOpEXT = vkCmdSetLogicOpEXT;
         vkCmdSetPrimitiveRestartEnableEXT: vk::PFN_vkCmdSetPrimitiveRestartEnable = vkCmdSetPrimitiveRestartEnable;
     }
+    Device, DeviceExtension(&[c"VK_EXT_extended_dynamic_state3"]) => {
+        vkCmdSetDepthClampEnableEXT: vk::PFN_vkCmdSetDepthClampEnableEXT = vkCmdSetDepthClampEnableEXT;
+        vkCmdSetPolygonModeEXT: vk::PFN_vkCmdSetPolygonModeEXT = vkCmdSetPolygonModeEXT;
+        vkCmdSetRasterizationSamplesEXT: vk::PFN_vkCmdSetRasterizationSamplesEXT = vkCmdSetRasterizationSamplesEXT;
+        vkCmdSetSampleMaskEXT: vk::PFN_vkCmdSetSampleMaskEXT = vkCmdSetSampleMaskEXT;
+        vkCmdSetAlphaToCoverageEnableEXT: vk::PFN_vkCmdSetAlphaToCoverageEnableEXT = vkCmdSetAlphaToCoverageEnableEXT;
+        vkCmdSetAlphaToOneEnableEXT: vk::PFN_vkCmdSetAlphaToOneEnableEXT = vkCmdSetAlphaToOneEnableEXT;
+        vkCmdSetLogicOpEnableEXT: vk::PFN_vkCmdSetLogicOpEnableEXT = vkCmdSetLogicOpEnableEXT;
+        vkCmdSetColorBlendEnableEXT: vk::PFN_vkCmdSetColorBlendEnableEXT = vkCmdSetColorBlendEnableEXT;
+        vkCmdSetColorBlendEquationEXT: vk::PFN_vkCmdSetColorBlendEquationEXT = vkCmdSetColorBlendEquationEXT;
+        vkCmdSetColorWriteMaskEXT: vk::PFN_vkCmdSetColorWriteMaskEXT = vkCmdSetColorWriteMaskEXT;
+        vkCmdSetTessellationDomainOriginEXT: vk::PFN_vkCmdSetTessellationDomainOriginEXT = vkCmdSetTessellationDomainOriginEXT;
+        vkCmdSetDepthClipEnableEXT: vk::PFN_vkCmdSetDepthClipEnableEXT = vkCmdSetDepthClipEnableEXT;
+        vkCmdSetProvokingVertexModeEXT: vk::PFN_vkCmdSetProvokingVertexModeEXT = vkCmdSetProvokingVertexModeEXT;
+        vkCmdSetLineRasterizationModeEXT: vk::PFN_vkCmdSetLineRasterizationModeEXT = vkCmdSetLineRasterizationModeEXT;
+        vkCmdSetLineStippleEnableEXT: vk::PFN_vkCmdSetLineStippleEnableEXT = vkCmdSetLineStippleEnableEXT;
+    }
+    Instance, InstanceExtension(&[c"VK_EXT_headless_surface"]) => {
+        vkCreateHeadlessSurfaceEXT: vk::PFN_vkCreateHeadlessSurfaceEXT = vkCreateHeadlessSurfaceEXT;
+    }
     Device, DeviceExtension(&[c"VK_EXT_host_query_reset"]) => {
         vkResetQueryPoolEXT: vk::PFN_vkResetQueryPool = vkResetQueryPool;
+    }
+    Device, DeviceExtension(&[c"VK_EXT_line_rasterization"]) => {
+        vkCmdSetLineStippleEXT: vk::PFN_vkCmdSetLineStippleKHR = vkCmdSetLineStippleEXT;
+    }
+    Device, DeviceExtension(&[c"VK_EXT_multi_draw"]) => {
+        vkCmdDrawMultiEXT: vk::PFN_vkCmdDrawMultiEXT = vkCmdDrawMultiEXT;
+        vkCmdDrawMultiIndexedEXT: vk::PFN_vkCmdDrawMultiIndexedEXT = vkCmdDrawMultiIndexedEXT;
     }
     Device, DeviceExtension(&[c"VK_EXT_private_data"]) => {
         vkCreatePrivateDataSlotEXT: vk::PFN_vkCreatePrivateDataSlot = vkCreatePrivateDataSlot;
@@ -305,6 +335,9 @@ static ROWS: &[Command] = rows! {
     }
     PhysicalDevice, DeviceExtension(&[c"VK_EXT_tooling_info"]) => {
         vkGetPhysicalDeviceToolPropertiesEXT: vk::PFN_vkGetPhysicalDeviceToolProperties = vkGetPhysicalDeviceToolProperties;
+    }
+    Device, DeviceExtension(&[c"VK_EXT_vertex_input_dynamic_state"]) => {
+        vkCmdSetVertexInputEXT: vk::PFN_vkCmdSetVertexInputEXT = vkCmdSetVertexInputEXT;
     }
     Device, DeviceExtension(&[c"VK_GAURAST_gaussian_primitive_topology"]) => {
         vkCmdSetGaussianCamerasGAURAST: gaurast::vk::PFN_vkCmdSetGaussianCamerasGAURAST = vkCmdSetGaussianCamerasGAURAST;
@@ -352,6 +385,22 @@ static ROWS: &[Command] = rows! {
     Device, DeviceExtension(&[c"VK_KHR_descriptor_update_template", c"VK_KHR_push_descriptor"]) => {
         vkCmdPushDescriptorSetWithTemplateKHR: vk::PFN_vkCmdPushDescriptorSetWithTemplateKHR = vkCmdPushDescriptorSetWithTemplateKHR;
     }
+    Device, DeviceExtension(&[c"VK_KHR_device_group"]) => {
+        vkGetDeviceGroupPeerMemoryFeaturesKHR: vk::PFN_vkGetDeviceGroupPeerMemoryFeatures = vkGetDeviceGroupPeerMemoryFeatures;
+        vkCmdSetDeviceMaskKHR: vk::PFN_vkCmdSetDeviceMask = vkCmdSetDeviceMask;
+        vkCmdDispatchBaseKHR: vk::PFN_vkCmdDispatchBase = vkCmdDispatchBase;
+    }
+    Device, DeviceExtension(&[c"VK_KHR_device_group", c"VK_KHR_swapchain"]) => {
+        vkGetDeviceGroupPresentCapabilitiesKHR: vk::PFN_vkGetDeviceGroupPresentCapabilitiesKHR = vkGetDeviceGroupPresentCapabilitiesKHR;
+        vkGetDeviceGroupSurfacePresentModesKHR: vk::PFN_vkGetDeviceGroupSurfacePresentModesKHR = vkGetDeviceGroupSurfacePresentModesKHR;
+        vkAcquireNextImage2KHR: vk::PFN_vkAcquireNextImage2KHR = vkAcquireNextImage2KHR;
+    }
+    PhysicalDevice, DeviceExtension(&[c"VK_KHR_device_group", c"VK_KHR_swapchain"]) => {
+        vkGetPhysicalDevicePresentRectanglesKHR: vk::PFN_vkGetPhysicalDevicePresentRectanglesKHR = vkGetPhysicalDevicePresentRectanglesKHR;
+    }
+    Instance, InstanceExtension(&[c"VK_KHR_device_group_creation"]) => {
+        vkEnumeratePhysicalDeviceGroupsKHR: vk::PFN_vkEnumeratePhysicalDeviceGroups = vkEnumeratePhysicalDeviceGroups;
+    }
     Device, DeviceExtension(&[c"VK_KHR_draw_indirect_count"]) => {
         vkCmdDrawIndirectCountKHR: vk::PFN_vkCmdDrawIndirectCount = vkCmdDrawIndirectCount;
         vkCmdDrawIndexedIndirectCountKHR: vk::PFN_vkCmdDrawIndexedIndirectCount = vkCmdDrawIndexedIndirectCount;
@@ -383,6 +432,10 @@ static ROWS: &[Command] = rows! {
         vkGetPhysicalDeviceMemoryProperties2KHR: vk::PFN_vkGetPhysicalDeviceMemoryProperties2 = vkGetPhysicalDeviceMemoryProperties2;
         vkGetPhysicalDeviceSparseImageFormatProperties2KHR: vk::PFN_vkGetPhysicalDeviceSparseImageFormatProperties2 = vkGetPhysicalDeviceSparseImageFormatProperties2;
     }
+    PhysicalDevice, InstanceExtension(&[c"VK_KHR_get_surface_capabilities2"]) => {
+        vkGetPhysicalDeviceSurfaceCapabilities2KHR: vk::PFN_vkGetPhysicalDeviceSurfaceCapabilities2KHR = vkGetPhysicalDeviceSurfaceCapabilities2KHR;
+        vkGetPhysicalDeviceSurfaceFormats2KHR: vk::PFN_vkGetPhysicalDeviceSurfaceFormats2KHR = vkGetPhysicalDeviceSurfaceFormats2KHR;
+    }
     Device, DeviceExtension(&[c"VK_KHR_maintenance1"]) => {
         vkTrimCommandPoolKHR: vk::PFN_vkTrimCommandPool = vkTrimCommandPool;
     }
@@ -409,6 +462,22 @@ static ROWS: &[Command] = rows! {
     Device, DeviceExtension(&[c"VK_KHR_push_descriptor"]) => {
         vkCmdPushDescriptorSetKHR: vk::PFN_vkCmdPushDescriptorSetKHR = vkCmdPushDescriptorSetKHR;
     }
+    Instance, InstanceExtension(&[c"VK_KHR_surface"]) => {
+        vkDestroySurfaceKHR: vk::PFN_vkDestroySurfaceKHR = vkDestroySurfaceKHR;
+    }
+    PhysicalDevice, InstanceExtension(&[c"VK_KHR_surface"]) => {
+        vkGetPhysicalDeviceSurfaceSupportKHR: vk::PFN_vkGetPhysicalDeviceSurfaceSupportKHR = vkGetPhysicalDeviceSurfaceSupportKHR;
+        vkGetPhysicalDeviceSurfaceCapabilitiesKHR: vk::PFN_vkGetPhysicalDeviceSurfaceCapabilitiesKHR = vkGetPhysicalDeviceSurfaceCapabilitiesKHR;
+        vkGetPhysicalDeviceSurfaceFormatsKHR: vk::PFN_vkGetPhysicalDeviceSurfaceFormatsKHR = vkGetPhysicalDeviceSurfaceFormatsKHR;
+        vkGetPhysicalDeviceSurfacePresentModesKHR: vk::PFN_vkGetPhysicalDeviceSurfacePresentModesKHR = vkGetPhysicalDeviceSurfacePresentModesKHR;
+    }
+    Device, DeviceExtension(&[c"VK_KHR_swapchain"]) => {
+        vkCreateSwapchainKHR: vk::PFN_vkCreateSwapchainKHR = vkCreateSwapchainKHR;
+        vkDestroySwapchainKHR: vk::PFN_vkDestroySwapchainKHR = vkDestroySwapchainKHR;
+        vkGetSwapchainImagesKHR: vk::PFN_vkGetSwapchainImagesKHR = vkGetSwapchainImagesKHR;
+        vkAcquireNextImageKHR: vk::PFN_vkAcquireNextImageKHR = vkAcquireNextImageKHR;
+        vkQueuePresentKHR: vk::PFN_vkQueuePresentKHR = vkQueuePresentKHR;
+    }
     Device, DeviceExtension(&[c"VK_KHR_synchronization2"]) => {
         vkCmdSetEvent2KHR: vk::PFN_vkCmdSetEvent2 = vkCmdSetEvent2;
         vkCmdResetEvent2KHR: vk::PFN_vkCmdResetEvent2 = vkCmdResetEvent2;
@@ -421,6 +490,24 @@ static ROWS: &[Command] = rows! {
         vkGetSemaphoreCounterValueKHR: vk::PFN_vkGetSemaphoreCounterValue = vkGetSemaphoreCounterValue;
         vkWaitSemaphoresKHR: vk::PFN_vkWaitSemaphores = vkWaitSemaphores;
         vkSignalSemaphoreKHR: vk::PFN_vkSignalSemaphore = vkSignalSemaphore;
+    }
+    Instance, InstanceExtension(&[c"VK_KHR_wayland_surface"]) => {
+        vkCreateWaylandSurfaceKHR: vk::PFN_vkCreateWaylandSurfaceKHR = vkCreateWaylandSurfaceKHR;
+    }
+    PhysicalDevice, InstanceExtension(&[c"VK_KHR_wayland_surface"]) => {
+        vkGetPhysicalDeviceWaylandPresentationSupportKHR: vk::PFN_vkGetPhysicalDeviceWaylandPresentationSupportKHR = vkGetPhysicalDeviceWaylandPresentationSupportKHR;
+    }
+    Instance, InstanceExtension(&[c"VK_KHR_xcb_surface"]) => {
+        vkCreateXcbSurfaceKHR: vk::PFN_vkCreateXcbSurfaceKHR = vkCreateXcbSurfaceKHR;
+    }
+    PhysicalDevice, InstanceExtension(&[c"VK_KHR_xcb_surface"]) => {
+        vkGetPhysicalDeviceXcbPresentationSupportKHR: vk::PFN_vkGetPhysicalDeviceXcbPresentationSupportKHR = vkGetPhysicalDeviceXcbPresentationSupportKHR;
+    }
+    Instance, InstanceExtension(&[c"VK_KHR_xlib_surface"]) => {
+        vkCreateXlibSurfaceKHR: vk::PFN_vkCreateXlibSurfaceKHR = vkCreateXlibSurfaceKHR;
+    }
+    PhysicalDevice, InstanceExtension(&[c"VK_KHR_xlib_surface"]) => {
+        vkGetPhysicalDeviceXlibPresentationSupportKHR: vk::PFN_vkGetPhysicalDeviceXlibPresentationSupportKHR = vkGetPhysicalDeviceXlibPresentationSupportKHR;
     }
 };
 
@@ -3017,7 +3104,7 @@ unsafe extern "system" fn vkBindImageMemory2(
     guard(device, "vkBindImageMemory2", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            crate::resource::image::bind_image_memory2(valid::slice(p_bind_infos, bind_info_count)?)
+            crate::swapchain::bind_image_memory2(valid::slice(p_bind_infos, bind_info_count)?)
                 .map(|()| vk::Result::SUCCESS)
         }
     })
@@ -4353,6 +4440,24 @@ unsafe extern "system" fn vkCmdSetPrimitiveRestartEnable(
     })
 }
 
+unsafe extern "system" fn vkCmdSetColorWriteEnableEXT(
+    command_buffer: vk::CommandBuffer,
+    attachment_count: u32,
+    p_color_write_enables: *const vk::Bool32,
+) {
+    guard(command_buffer, "vkCmdSetColorWriteEnableEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdSetColorWriteEnableEXT", |recorder| {
+                crate::command::dynamic_state::cmd_set_color_write_enable(
+                    recorder,
+                    valid::slice(p_color_write_enables, attachment_count)?,
+                )
+            })
+        }
+    })
+}
+
 unsafe extern "system" fn vkSetDebugUtilsObjectNameEXT(
     device: vk::Device,
     _: *const vk::DebugUtilsObjectNameInfoEXT<'_>,
@@ -4476,14 +4581,416 @@ unsafe extern "system" fn vkCmdSetPatchControlPointsEXT(command_buffer: vk::Comm
     })
 }
 
-unsafe extern "system" fn vkCmdSetLogicOpEXT(command_buffer: vk::CommandBuffer, _: vk::LogicOp) {
+unsafe extern "system" fn vkCmdSetLogicOpEXT(
+    command_buffer: vk::CommandBuffer,
+    logic_op: vk::LogicOp,
+) {
     guard(command_buffer, "vkCmdSetLogicOpEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdSetLogicOpEXT", |recorder| {
+                crate::command::dynamic_state::cmd_set_logic_op(recorder, logic_op)
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetDepthClampEnableEXT(
+    command_buffer: vk::CommandBuffer,
+    depth_clamp_enable: vk::Bool32,
+) {
+    guard(command_buffer, "vkCmdSetDepthClampEnableEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdSetDepthClampEnableEXT", |recorder| {
+                let enable = depth_clamp_enable != vk::FALSE;
+                crate::command::dynamic_state::set(
+                    recorder,
+                    DynamicState::DepthClampEnable { enable },
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetPolygonModeEXT(
+    command_buffer: vk::CommandBuffer,
+    polygon_mode: vk::PolygonMode,
+) {
+    guard(command_buffer, "vkCmdSetPolygonModeEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdSetPolygonModeEXT", |recorder| {
+                crate::command::dynamic_state::cmd_set_polygon_mode(recorder, polygon_mode)
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetRasterizationSamplesEXT(
+    command_buffer: vk::CommandBuffer,
+    _: vk::SampleCountFlags,
+) {
+    guard(command_buffer, "vkCmdSetRasterizationSamplesEXT", || {
         // SAFETY: the application follows Vulkan's valid usage: the handle is live.
         unsafe {
-            record(command_buffer, "vkCmdSetLogicOpEXT", |_| {
+            record(command_buffer, "vkCmdSetRasterizationSamplesEXT", |_| {
                 Err(Error::Unsupported {
-                    command: "vkCmdSetLogicOpEXT".to_owned(),
+                    command: "vkCmdSetRasterizationSamplesEXT".to_owned(),
                 })
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetSampleMaskEXT(
+    command_buffer: vk::CommandBuffer,
+    _: vk::SampleCountFlags,
+    p_sample_mask: *const vk::SampleMask,
+) {
+    guard(command_buffer, "vkCmdSetSampleMaskEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdSetSampleMaskEXT", |recorder| {
+                crate::command::dynamic_state::cmd_set_sample_mask(
+                    recorder,
+                    valid::optional(p_sample_mask),
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetAlphaToCoverageEnableEXT(
+    command_buffer: vk::CommandBuffer,
+    alpha_to_coverage_enable: vk::Bool32,
+) {
+    guard(command_buffer, "vkCmdSetAlphaToCoverageEnableEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(
+                command_buffer,
+                "vkCmdSetAlphaToCoverageEnableEXT",
+                |recorder| {
+                    let enable = alpha_to_coverage_enable != vk::FALSE;
+                    crate::command::dynamic_state::set(
+                        recorder,
+                        DynamicState::AlphaToCoverageEnable { enable },
+                    )
+                },
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetAlphaToOneEnableEXT(
+    command_buffer: vk::CommandBuffer,
+    alpha_to_one_enable: vk::Bool32,
+) {
+    guard(command_buffer, "vkCmdSetAlphaToOneEnableEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdSetAlphaToOneEnableEXT", |recorder| {
+                let enable = alpha_to_one_enable != vk::FALSE;
+                crate::command::dynamic_state::set(
+                    recorder,
+                    DynamicState::AlphaToOneEnable { enable },
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetLogicOpEnableEXT(
+    command_buffer: vk::CommandBuffer,
+    logic_op_enable: vk::Bool32,
+) {
+    guard(command_buffer, "vkCmdSetLogicOpEnableEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdSetLogicOpEnableEXT", |recorder| {
+                let enable = logic_op_enable != vk::FALSE;
+                crate::command::dynamic_state::set(recorder, DynamicState::LogicOpEnable { enable })
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetColorBlendEnableEXT(
+    command_buffer: vk::CommandBuffer,
+    first_attachment: u32,
+    attachment_count: u32,
+    p_color_blend_enables: *const vk::Bool32,
+) {
+    guard(command_buffer, "vkCmdSetColorBlendEnableEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdSetColorBlendEnableEXT", |recorder| {
+                crate::command::dynamic_state::cmd_set_color_blend_enable(
+                    recorder,
+                    first_attachment,
+                    valid::slice(p_color_blend_enables, attachment_count)?,
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetColorBlendEquationEXT(
+    command_buffer: vk::CommandBuffer,
+    first_attachment: u32,
+    attachment_count: u32,
+    p_color_blend_equations: *const vk::ColorBlendEquationEXT,
+) {
+    guard(command_buffer, "vkCmdSetColorBlendEquationEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(
+                command_buffer,
+                "vkCmdSetColorBlendEquationEXT",
+                |recorder| {
+                    crate::command::dynamic_state::cmd_set_color_blend_equation(
+                        recorder,
+                        first_attachment,
+                        valid::slice(p_color_blend_equations, attachment_count)?,
+                    )
+                },
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetColorWriteMaskEXT(
+    command_buffer: vk::CommandBuffer,
+    first_attachment: u32,
+    attachment_count: u32,
+    p_color_write_masks: *const vk::ColorComponentFlags,
+) {
+    guard(command_buffer, "vkCmdSetColorWriteMaskEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdSetColorWriteMaskEXT", |recorder| {
+                crate::command::dynamic_state::cmd_set_color_write_mask(
+                    recorder,
+                    first_attachment,
+                    valid::slice(p_color_write_masks, attachment_count)?,
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetTessellationDomainOriginEXT(
+    command_buffer: vk::CommandBuffer,
+    _: vk::TessellationDomainOrigin,
+) {
+    guard(
+        command_buffer,
+        "vkCmdSetTessellationDomainOriginEXT",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: the handle is live.
+            unsafe {
+                record(
+                    command_buffer,
+                    "vkCmdSetTessellationDomainOriginEXT",
+                    |_| {
+                        Err(Error::Unsupported {
+                            command: "vkCmdSetTessellationDomainOriginEXT".to_owned(),
+                        })
+                    },
+                )
+            }
+        },
+    )
+}
+
+unsafe extern "system" fn vkCmdSetDepthClipEnableEXT(
+    command_buffer: vk::CommandBuffer,
+    depth_clip_enable: vk::Bool32,
+) {
+    guard(command_buffer, "vkCmdSetDepthClipEnableEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdSetDepthClipEnableEXT", |recorder| {
+                let enable = depth_clip_enable != vk::FALSE;
+                crate::command::dynamic_state::set(
+                    recorder,
+                    DynamicState::DepthClipEnable { enable },
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetProvokingVertexModeEXT(
+    command_buffer: vk::CommandBuffer,
+    provoking_vertex_mode: vk::ProvokingVertexModeEXT,
+) {
+    guard(command_buffer, "vkCmdSetProvokingVertexModeEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(
+                command_buffer,
+                "vkCmdSetProvokingVertexModeEXT",
+                |recorder| {
+                    let mode = provoking_vertex_mode;
+                    crate::command::dynamic_state::set(
+                        recorder,
+                        DynamicState::ProvokingVertexMode { mode },
+                    )
+                },
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetLineRasterizationModeEXT(
+    command_buffer: vk::CommandBuffer,
+    line_rasterization_mode: vk::LineRasterizationModeEXT,
+) {
+    guard(command_buffer, "vkCmdSetLineRasterizationModeEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(
+                command_buffer,
+                "vkCmdSetLineRasterizationModeEXT",
+                |recorder| {
+                    let mode = line_rasterization_mode;
+                    crate::command::dynamic_state::set(
+                        recorder,
+                        DynamicState::LineRasterizationMode { mode },
+                    )
+                },
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetLineStippleEnableEXT(
+    command_buffer: vk::CommandBuffer,
+    stippled_line_enable: vk::Bool32,
+) {
+    guard(command_buffer, "vkCmdSetLineStippleEnableEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdSetLineStippleEnableEXT", |recorder| {
+                let enable = stippled_line_enable != vk::FALSE;
+                crate::command::dynamic_state::set(
+                    recorder,
+                    DynamicState::LineStippleEnable { enable },
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCreateHeadlessSurfaceEXT(
+    instance: vk::Instance,
+    _: *const vk::HeadlessSurfaceCreateInfoEXT<'_>,
+    _: *const vk::AllocationCallbacks<'_>,
+    p_surface: *mut vk::SurfaceKHR,
+) -> vk::Result {
+    guard(instance, "vkCreateHeadlessSurfaceEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_surface,
+                handle::create(crate::surface::create_headless_surface()?),
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetLineStippleEXT(
+    command_buffer: vk::CommandBuffer,
+    _: u32,
+    _: u16,
+) {
+    guard(command_buffer, "vkCmdSetLineStippleEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdSetLineStippleEXT", |recorder| {
+                crate::command::dynamic_state::cmd_set_line_stipple(recorder)
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdDrawMultiEXT(
+    command_buffer: vk::CommandBuffer,
+    draw_count: u32,
+    p_vertex_info: *const vk::MultiDrawInfoEXT,
+    instance_count: u32,
+    first_instance: u32,
+    stride: u32,
+) {
+    guard(command_buffer, "vkCmdDrawMultiEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdDrawMultiEXT", |recorder| {
+                crate::command::draw::cmd_draw_multi(
+                    recorder,
+                    draw_count,
+                    p_vertex_info,
+                    instance_count,
+                    first_instance,
+                    stride,
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdDrawMultiIndexedEXT(
+    command_buffer: vk::CommandBuffer,
+    draw_count: u32,
+    p_index_info: *const vk::MultiDrawIndexedInfoEXT,
+    instance_count: u32,
+    first_instance: u32,
+    stride: u32,
+    p_vertex_offset: *const i32,
+) {
+    guard(command_buffer, "vkCmdDrawMultiIndexedEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdDrawMultiIndexedEXT", |recorder| {
+                crate::command::draw::cmd_draw_multi_indexed(
+                    recorder,
+                    draw_count,
+                    p_index_info,
+                    instance_count,
+                    first_instance,
+                    stride,
+                    p_vertex_offset,
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetVertexInputEXT(
+    command_buffer: vk::CommandBuffer,
+    vertex_binding_description_count: u32,
+    p_vertex_binding_descriptions: *const vk::VertexInputBindingDescription2EXT<'_>,
+    vertex_attribute_description_count: u32,
+    p_vertex_attribute_descriptions: *const vk::VertexInputAttributeDescription2EXT<'_>,
+) {
+    guard(command_buffer, "vkCmdSetVertexInputEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdSetVertexInputEXT", |recorder| {
+                crate::command::bind::cmd_set_vertex_input(
+                    recorder,
+                    valid::slice(
+                        p_vertex_binding_descriptions,
+                        vertex_binding_description_count,
+                    )?,
+                    valid::slice(
+                        p_vertex_attribute_descriptions,
+                        vertex_attribute_description_count,
+                    )?,
+                )
             })
         }
     })
@@ -4791,6 +5298,123 @@ unsafe extern "system" fn vkCmdPushDescriptorSetWithTemplateKHR(
     )
 }
 
+unsafe extern "system" fn vkGetDeviceGroupPresentCapabilitiesKHR(
+    device: vk::Device,
+    p_device_group_present_capabilities: *mut vk::DeviceGroupPresentCapabilitiesKHR<'_>,
+) -> vk::Result {
+    guard(device, "vkGetDeviceGroupPresentCapabilitiesKHR", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::surface::get_device_group_present_capabilities(valid::output_structure(
+                p_device_group_present_capabilities,
+            )?)
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkGetDeviceGroupSurfacePresentModesKHR(
+    device: vk::Device,
+    surface: vk::SurfaceKHR,
+    p_modes: *mut vk::DeviceGroupPresentModeFlagsKHR,
+) -> vk::Result {
+    guard(device, "vkGetDeviceGroupSurfacePresentModesKHR", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_modes,
+                crate::surface::get_device_group_surface_present_modes(handle::get(surface)?)?,
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkGetPhysicalDevicePresentRectanglesKHR(
+    physical_device: vk::PhysicalDevice,
+    surface: vk::SurfaceKHR,
+    p_rect_count: *mut u32,
+    p_rects: *mut vk::Rect2D,
+) -> vk::Result {
+    guard(
+        physical_device,
+        "vkGetPhysicalDevicePresentRectanglesKHR",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                valid::enumerate(
+                    p_rect_count,
+                    p_rects,
+                    &crate::surface::get_physical_device_present_rectangles(handle::get(surface)?)?,
+                )
+            }
+        },
+    )
+}
+
+unsafe extern "system" fn vkAcquireNextImage2KHR(
+    device: vk::Device,
+    p_acquire_info: *const vk::AcquireNextImageInfoKHR<'_>,
+    p_image_index: *mut u32,
+) -> vk::Result {
+    guard(device, "vkAcquireNextImage2KHR", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            let info = valid::input(p_acquire_info)?;
+            crate::swapchain::acquire_next_image(
+                handle::get(info.swapchain)?,
+                info.timeout,
+                handle::get_optional(info.semaphore)?.map(AsRef::as_ref),
+                handle::get_optional(info.fence)?.map(AsRef::as_ref),
+                valid::output_structure(p_image_index)?,
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkGetPhysicalDeviceSurfaceCapabilities2KHR(
+    physical_device: vk::PhysicalDevice,
+    p_surface_info: *const vk::PhysicalDeviceSurfaceInfo2KHR<'_>,
+    p_surface_capabilities: *mut vk::SurfaceCapabilities2KHR<'_>,
+) -> vk::Result {
+    guard(
+        physical_device,
+        "vkGetPhysicalDeviceSurfaceCapabilities2KHR",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                let info = valid::input(p_surface_info)?;
+                crate::surface::get_physical_device_surface_capabilities2(
+                    handle::get(info.surface)?,
+                    OutputChain::new(p_surface_capabilities)?,
+                )
+                .map(|()| vk::Result::SUCCESS)
+            }
+        },
+    )
+}
+
+unsafe extern "system" fn vkGetPhysicalDeviceSurfaceFormats2KHR(
+    physical_device: vk::PhysicalDevice,
+    _: *const vk::PhysicalDeviceSurfaceInfo2KHR<'_>,
+    p_surface_format_count: *mut u32,
+    p_surface_formats: *mut vk::SurfaceFormat2KHR<'_>,
+) -> vk::Result {
+    guard(
+        physical_device,
+        "vkGetPhysicalDeviceSurfaceFormats2KHR",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                crate::surface::get_physical_device_surface_formats2(Structures::new(
+                    p_surface_format_count,
+                    p_surface_formats,
+                )?)
+            }
+        },
+    )
+}
+
 unsafe extern "system" fn vkMapMemory2KHR(
     device: vk::Device,
     p_memory_map_info: *const vk::MemoryMapInfoKHR<'_>,
@@ -4910,4 +5534,291 @@ unsafe extern "system" fn vkCmdPushDescriptorSetKHR(
             })
         }
     })
+}
+
+unsafe extern "system" fn vkDestroySurfaceKHR(
+    instance: vk::Instance,
+    surface: vk::SurfaceKHR,
+    _: *const vk::AllocationCallbacks<'_>,
+) {
+    guard(instance, "vkDestroySurfaceKHR", || {
+        // SAFETY: the application follows Vulkan's valid usage: the handle is null or live, and used no more.
+        unsafe { handle::destroy(surface) }.map(drop)
+    })
+}
+
+unsafe extern "system" fn vkGetPhysicalDeviceSurfaceSupportKHR(
+    physical_device: vk::PhysicalDevice,
+    _: u32,
+    surface: vk::SurfaceKHR,
+    p_supported: *mut vk::Bool32,
+) -> vk::Result {
+    guard(
+        physical_device,
+        "vkGetPhysicalDeviceSurfaceSupportKHR",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                valid::output(
+                    p_supported,
+                    crate::surface::get_physical_device_surface_support(handle::get(surface)?)?,
+                )
+                .map(|()| vk::Result::SUCCESS)
+            }
+        },
+    )
+}
+
+unsafe extern "system" fn vkGetPhysicalDeviceSurfaceCapabilitiesKHR(
+    physical_device: vk::PhysicalDevice,
+    surface: vk::SurfaceKHR,
+    p_surface_capabilities: *mut vk::SurfaceCapabilitiesKHR,
+) -> vk::Result {
+    guard(
+        physical_device,
+        "vkGetPhysicalDeviceSurfaceCapabilitiesKHR",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                valid::output(
+                    p_surface_capabilities,
+                    crate::surface::get_physical_device_surface_capabilities(handle::get(
+                        surface,
+                    )?)?,
+                )
+                .map(|()| vk::Result::SUCCESS)
+            }
+        },
+    )
+}
+
+unsafe extern "system" fn vkGetPhysicalDeviceSurfaceFormatsKHR(
+    physical_device: vk::PhysicalDevice,
+    surface: vk::SurfaceKHR,
+    p_surface_format_count: *mut u32,
+    p_surface_formats: *mut vk::SurfaceFormatKHR,
+) -> vk::Result {
+    guard(
+        physical_device,
+        "vkGetPhysicalDeviceSurfaceFormatsKHR",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                valid::enumerate(
+                    p_surface_format_count,
+                    p_surface_formats,
+                    &crate::surface::get_physical_device_surface_formats(handle::get(surface)?)?,
+                )
+            }
+        },
+    )
+}
+
+unsafe extern "system" fn vkGetPhysicalDeviceSurfacePresentModesKHR(
+    physical_device: vk::PhysicalDevice,
+    surface: vk::SurfaceKHR,
+    p_present_mode_count: *mut u32,
+    p_present_modes: *mut vk::PresentModeKHR,
+) -> vk::Result {
+    guard(
+        physical_device,
+        "vkGetPhysicalDeviceSurfacePresentModesKHR",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                valid::enumerate(
+                    p_present_mode_count,
+                    p_present_modes,
+                    &crate::surface::get_physical_device_surface_present_modes(handle::get(
+                        surface,
+                    )?)?,
+                )
+            }
+        },
+    )
+}
+
+unsafe extern "system" fn vkCreateSwapchainKHR(
+    device: vk::Device,
+    p_create_info: *const vk::SwapchainCreateInfoKHR<'_>,
+    _: *const vk::AllocationCallbacks<'_>,
+    p_swapchain: *mut vk::SwapchainKHR,
+) -> vk::Result {
+    guard(device, "vkCreateSwapchainKHR", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            let info = valid::input(p_create_info)?;
+            valid::output(
+                p_swapchain,
+                handle::create(crate::swapchain::create_swapchain(
+                    handle::get(device)?,
+                    valid::input(p_create_info)?,
+                    handle::get(info.surface)?,
+                    handle::get_optional(info.old_swapchain)?.map(AsRef::as_ref),
+                )?),
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkDestroySwapchainKHR(
+    device: vk::Device,
+    swapchain: vk::SwapchainKHR,
+    _: *const vk::AllocationCallbacks<'_>,
+) {
+    guard(device, "vkDestroySwapchainKHR", || {
+        // SAFETY: the application follows Vulkan's valid usage: the handle is null or live, and used no more.
+        unsafe { handle::destroy(swapchain) }.map(drop)
+    })
+}
+
+unsafe extern "system" fn vkGetSwapchainImagesKHR(
+    device: vk::Device,
+    swapchain: vk::SwapchainKHR,
+    p_swapchain_image_count: *mut u32,
+    p_swapchain_images: *mut vk::Image,
+) -> vk::Result {
+    guard(device, "vkGetSwapchainImagesKHR", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::enumerate(
+                p_swapchain_image_count,
+                p_swapchain_images,
+                &crate::swapchain::get_swapchain_images(handle::get(swapchain)?)?,
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkAcquireNextImageKHR(
+    device: vk::Device,
+    swapchain: vk::SwapchainKHR,
+    timeout: u64,
+    semaphore: vk::Semaphore,
+    fence: vk::Fence,
+    p_image_index: *mut u32,
+) -> vk::Result {
+    guard(device, "vkAcquireNextImageKHR", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::swapchain::acquire_next_image(
+                handle::get(swapchain)?,
+                timeout,
+                handle::get_optional(semaphore)?.map(AsRef::as_ref),
+                handle::get_optional(fence)?.map(AsRef::as_ref),
+                valid::output_structure(p_image_index)?,
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkQueuePresentKHR(
+    queue: vk::Queue,
+    p_present_info: *const vk::PresentInfoKHR<'_>,
+) -> vk::Result {
+    guard(queue, "vkQueuePresentKHR", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::swapchain::queue_present(handle::get(queue)?, valid::input(p_present_info)?)
+        }
+    })
+}
+
+unsafe extern "system" fn vkCreateWaylandSurfaceKHR(
+    instance: vk::Instance,
+    p_create_info: *const vk::WaylandSurfaceCreateInfoKHR<'_>,
+    _: *const vk::AllocationCallbacks<'_>,
+    p_surface: *mut vk::SurfaceKHR,
+) -> vk::Result {
+    guard(instance, "vkCreateWaylandSurfaceKHR", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_surface,
+                handle::create(crate::surface::create_wayland_surface(valid::input(
+                    p_create_info,
+                )?)?),
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkGetPhysicalDeviceWaylandPresentationSupportKHR(
+    physical_device: vk::PhysicalDevice,
+    queue_family_index: u32,
+    _: *mut vk::wl_display,
+) -> vk::Bool32 {
+    guard(
+        physical_device,
+        "vkGetPhysicalDeviceWaylandPresentationSupportKHR",
+        || crate::surface::get_physical_device_presentation_support(queue_family_index),
+    )
+}
+
+unsafe extern "system" fn vkCreateXcbSurfaceKHR(
+    instance: vk::Instance,
+    p_create_info: *const vk::XcbSurfaceCreateInfoKHR<'_>,
+    _: *const vk::AllocationCallbacks<'_>,
+    p_surface: *mut vk::SurfaceKHR,
+) -> vk::Result {
+    guard(instance, "vkCreateXcbSurfaceKHR", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_surface,
+                handle::create(crate::surface::create_xcb_surface(valid::input(
+                    p_create_info,
+                )?)?),
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkGetPhysicalDeviceXcbPresentationSupportKHR(
+    physical_device: vk::PhysicalDevice,
+    queue_family_index: u32,
+    _: *mut vk::xcb_connection_t,
+    _: vk::xcb_visualid_t,
+) -> vk::Bool32 {
+    guard(
+        physical_device,
+        "vkGetPhysicalDeviceXcbPresentationSupportKHR",
+        || crate::surface::get_physical_device_presentation_support(queue_family_index),
+    )
+}
+
+unsafe extern "system" fn vkCreateXlibSurfaceKHR(
+    instance: vk::Instance,
+    p_create_info: *const vk::XlibSurfaceCreateInfoKHR<'_>,
+    _: *const vk::AllocationCallbacks<'_>,
+    p_surface: *mut vk::SurfaceKHR,
+) -> vk::Result {
+    guard(instance, "vkCreateXlibSurfaceKHR", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_surface,
+                handle::create(crate::surface::create_xlib_surface(valid::input(
+                    p_create_info,
+                )?)?),
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkGetPhysicalDeviceXlibPresentationSupportKHR(
+    physical_device: vk::PhysicalDevice,
+    queue_family_index: u32,
+    _: *mut vk::Display,
+    _: vk::VisualID,
+) -> vk::Bool32 {
+    guard(
+        physical_device,
+        "vkGetPhysicalDeviceXlibPresentationSupportKHR",
+        || crate::surface::get_physical_device_presentation_support(queue_family_index),
+    )
 }

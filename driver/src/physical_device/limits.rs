@@ -351,6 +351,9 @@ fn find_properties() -> Properties {
         filter_minmax_image_component_mapping: true,
         max_timeline_semaphore_value_difference: u64::MAX,
         max_custom_border_color_samplers: 1 << 16,
+        max_multi_draw_count: 1 << 16,
+        line_sub_pixel_precision_bits: 8,
+        dynamic_primitive_topology_unrestricted: false,
         // Every access is held against the range itself, scalar by scalar.
         robust_storage_buffer_access_size_alignment: 1,
         robust_uniform_buffer_access_size_alignment: 1,

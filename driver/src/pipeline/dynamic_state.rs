@@ -1,10 +1,10 @@
 //! Dynamic state: the table of what a command buffer may set, and what it has set.
 
-use super::state::FixedFunctionState as Fixed;
+use super::state::{BlendEquations, FixedFunctionState as Fixed};
 use crate::convert::StencilOps;
 use ash::vk;
 use simdevice::state::gaussian::GaussianOrder;
-use simdevice::state::{CompareOp, DepthBias, Topology};
+use simdevice::state::{CompareOp, DepthBias, LogicOp, PolygonMode, Topology};
 
 /// The face that a stencil state is for: 0 is the front, 1 the back.
 pub(crate) type Face = usize;
@@ -77,7 +77,7 @@ struct Row {
 
 /// The table: `LINE_WIDTH => LineWidth(width: f32), set .., needed .., gaussians ..;` is the state of that name, its value, how
 /// the value becomes part of fixed-function state, when a draw needs it to be set, and what Gaussians make of it. A state
-/// that each face has of its own names the face in brackets.
+/// that each face, or each colour attachment, has of its own names that in brackets.
 macro_rules! dynamic_states {
     ($(
         $state:ident => $variant:ident $([$face:ident])? ($value:ident: $type:ty),
@@ -181,16 +181,53 @@ dynamic_states! {
     GAUSSIAN_CONTRIBUTION_BUDGET => GaussianContributionBudget(budget: f32),
         set |state| state.set_gaussian(|own| own.approximation.contribution_budget = budget),
         needed Fixed::draws_gaussians, gaussians Taken;
+    DEPTH_CLAMP_ENABLE_EXT => DepthClampEnable(enable: bool),
+        set |state| state.draw.depth_clamp = enable, needed Fixed::rasterizes, gaussians Refused;
+    DEPTH_CLIP_ENABLE_EXT => DepthClipEnable(enable: bool),
+        set |state| state.draw.depth_clip = Some(enable), needed Fixed::rasterizes, gaussians Refused;
+    POLYGON_MODE_EXT => PolygonMode(mode: PolygonMode),
+        set |state| state.draw.polygon_mode = mode, needed Fixed::rasterizes, gaussians Refused;
+    PROVOKING_VERTEX_MODE_EXT => ProvokingVertexMode(mode: vk::ProvokingVertexModeEXT),
+        set |state| state.draw.provoking_last = mode == vk::ProvokingVertexModeEXT::LAST_VERTEX,
+        needed Fixed::rasterizes, gaussians Refused;
+    LINE_RASTERIZATION_MODE_EXT => LineRasterizationMode(mode: vk::LineRasterizationModeEXT),
+        set |_| { let _ = mode; }, needed |_| false, gaussians Refused;
+    LINE_STIPPLE_ENABLE_EXT => LineStippleEnable(enable: bool),
+        set |_| { let _ = enable; }, needed |_| false, gaussians Refused;
+    SAMPLE_MASK_EXT => SampleMask(mask: u32),
+        set |state| state.draw.sample_mask = mask, needed Fixed::rasterizes, gaussians Refused;
+    ALPHA_TO_COVERAGE_ENABLE_EXT => AlphaToCoverageEnable(enable: bool),
+        set |state| state.draw.alpha_to_coverage = enable, needed Fixed::rasterizes, gaussians Refused;
+    ALPHA_TO_ONE_ENABLE_EXT => AlphaToOneEnable(enable: bool),
+        set |state| state.draw.alpha_to_one = enable, needed Fixed::rasterizes, gaussians Refused;
+    LOGIC_OP_EXT => LogicOp(op: LogicOp),
+        set |state| state.logic_op = op, needed Fixed::operates, gaussians Refused;
+    LOGIC_OP_ENABLE_EXT => LogicOpEnable(enable: bool),
+        set |state| state.logic_op_enable = enable, needed Fixed::has_colors, gaussians Refused;
+    COLOR_BLEND_ENABLE_EXT => ColorBlendEnable[attachment](enable: bool),
+        set |state| state.set_attachment(attachment, |it| it.blend_enable = enable),
+        needed Fixed::has_colors, gaussians Refused;
+    COLOR_BLEND_EQUATION_EXT => ColorBlendEquation[attachment](equations: BlendEquations),
+        set |state| state.set_attachment(attachment, |it| it.equations = equations),
+        needed Fixed::blends, gaussians Refused;
+    COLOR_WRITE_MASK_EXT => ColorWriteMask[attachment](mask: u8),
+        set |state| state.set_attachment(attachment, |it| it.write_mask = mask),
+        needed Fixed::has_colors, gaussians Refused;
+    COLOR_WRITE_ENABLE_EXT => ColorWriteEnable[attachment](enable: bool),
+        set |state| state.set_attachment(attachment, |it| it.write_enable = enable),
+        needed Fixed::has_colors, gaussians Refused;
 }
 
-/// The dynamic states that are looked up for each draw, and that no row has a value of: viewports, scissors and strides.
-/// Gaussians may have all of them.
-const LOOKED_UP: [vk::DynamicState; 5] = [
+/// The dynamic states that are looked up for each draw, and that no row has a value of: viewports, scissors, strides and
+/// vertex input; and the stipple of lines, which have none. Gaussians may have all but the last two.
+const LOOKED_UP: [vk::DynamicState; 7] = [
     vk::DynamicState::VIEWPORT,
     vk::DynamicState::VIEWPORT_WITH_COUNT,
     vk::DynamicState::SCISSOR,
     vk::DynamicState::SCISSOR_WITH_COUNT,
     vk::DynamicState::VERTEX_INPUT_BINDING_STRIDE,
+    vk::DynamicState::VERTEX_INPUT_EXT,
+    vk::DynamicState::LINE_STIPPLE_KHR,
 ];
 
 fn row(state: vk::DynamicState) -> Option<&'static Row> {
@@ -214,7 +251,7 @@ pub(crate) fn is_taken_by_gaussians(state: vk::DynamicState) -> bool {
 
 /// Tells if a Gaussian pipeline may have a state dynamic.
 pub(crate) fn may_gaussians_have(state: vk::DynamicState) -> bool {
-    row(state).map_or(LOOKED_UP.contains(&state), |row| {
+    row(state).map_or(LOOKED_UP[..5].contains(&state), |row| {
         row.gaussians != Gaussians::Refused
     })
 }
@@ -297,11 +334,14 @@ mod tests {
         use vk::DynamicState as S;
         let all = || ROWS.iter().map(|row| row.state).chain(LOOKED_UP);
         assert!(all().all(is_supported));
-        assert!(!is_supported(S::LINE_STIPPLE_KHR));
+        assert!(!is_supported(S::RASTERIZATION_SAMPLES_EXT));
         let taken = all().filter(|&state| is_taken_by_gaussians(state));
         assert_eq!(taken.count(), 20);
         let refused = all().filter(|&state| !may_gaussians_have(state));
+        let refused: Vec<_> = refused.collect();
         let expected = [S::PRIMITIVE_RESTART_ENABLE, S::RASTERIZER_DISCARD_ENABLE];
-        assert_eq!(refused.collect::<Vec<_>>(), expected);
+        assert_eq!(refused[..2], expected);
+        // All of VK_EXT_extended_dynamic_state3 and what comes with it.
+        assert_eq!(refused.len(), 19);
     }
 }

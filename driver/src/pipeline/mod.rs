@@ -9,7 +9,7 @@ pub(crate) mod layout;
 mod link;
 pub(crate) mod primitives;
 pub(crate) mod resources;
-mod stages;
+pub(crate) mod stages;
 pub(crate) mod state;
 #[cfg(test)]
 mod tests;
@@ -76,7 +76,8 @@ impl GraphicsPipeline {
         };
         Ok(Self {
             kind,
-            dynamic_stride: info.is_dynamic(vk::DynamicState::VERTEX_INPUT_BINDING_STRIDE),
+            dynamic_stride: info.is_dynamic(vk::DynamicState::VERTEX_INPUT_BINDING_STRIDE)
+                || info.is_dynamic(vk::DynamicState::VERTEX_INPUT_EXT),
         })
     }
 }

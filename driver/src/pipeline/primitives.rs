@@ -12,7 +12,7 @@ use crate::abi::error::Error;
 use crate::device::Device;
 use crate::shader_module::ShaderStage;
 use ash::vk;
-use gaurast_spirv::Stage;
+use gaurast_spirv::{ScalarType, Stage};
 use simdevice::program::vertex::DrawPipeline;
 use simdevice::state::{DrawState, PolygonMode};
 use std::sync::Arc;
@@ -22,8 +22,10 @@ use std::sync::Arc;
 pub(crate) struct PrimitivePipeline {
     /// The programs.
     pub(crate) programs: Arc<DrawPipeline>,
-    /// The sources of the vertex program's attributes.
+    /// The sources of the vertex program's attributes, unless they are dynamic.
     pub(crate) attributes: Vec<AttributeSource>,
+    /// The locations that the vertex program reads, if their sources are dynamic.
+    pub(crate) dynamic_locations: Option<Vec<(u32, ScalarType)>>,
     /// The resources that the vertex program is bound to.
     pub(crate) vertex_resources: ProgramResources,
     /// The resources that the fragment program is bound to.
@@ -57,6 +59,9 @@ impl PrimitivePipeline {
     /// # Errors
     /// An [`Error`] that names the valid usage broken, or the feature that the device lacks.
     pub(crate) fn new(device: &Device, info: &GraphicsState) -> Result<Self, Error> {
+        if !device.features().primitive_topology_list_restart {
+            info.require_no_list_restart()?;
+        }
         let fixed = FixedFunctionState::new(info)?;
         let (dynamic, viewports, scissors) = dynamic(info)?;
         let layout = info.layout.ok_or_else(|| {
@@ -73,7 +78,12 @@ impl PrimitivePipeline {
             .map(|stage| stages::translate(device, layout, stage, Stage::Fragment, samples))
             .transpose()?;
         let locations = vertex.interface.locations_read();
-        let attributes = stages::attributes(info, &locations)?;
+        let is_dynamic = info.is_dynamic(vk::DynamicState::VERTEX_INPUT_EXT);
+        let attributes = if is_dynamic {
+            Vec::new()
+        } else {
+            stages::attributes(&info.vertex_input, &locations)?
+        };
         if let Some(fragment) = &fragment {
             stages::warn_of_unwritten(device, &vertex.interface, &fragment.interface);
         }
@@ -84,8 +94,10 @@ impl PrimitivePipeline {
         let color = live_color_outputs(info, &fixed);
         let live_outputs = LiveOutputs {
             color: &color,
-            second_source: info.fragment_output.blend.iter().any(reads_second_source),
+            second_source: info.fragment_output.blend.iter().any(reads_second_source)
+                || info.is_dynamic(vk::DynamicState::COLOR_BLEND_EQUATION_EXT),
             points: state::class(fixed.draw.topology) == Class::Points
+                || info.is_dynamic(vk::DynamicState::POLYGON_MODE_EXT)
                 || fixed.draw.polygon_mode == PolygonMode::Point,
             views: info.fragment_output.view_mask != 0,
         };
@@ -99,6 +111,7 @@ impl PrimitivePipeline {
         Ok(Self {
             programs: Arc::new(programs),
             attributes,
+            dynamic_locations: is_dynamic.then_some(locations),
             vertex_resources,
             fragment_resources,
             state: is_static.then(|| Arc::new(fixed.draw_state())),

@@ -2,7 +2,7 @@
 
 use super::layout::PipelineLayout;
 use super::link;
-use super::state::{AttributeSource, GraphicsState, source};
+use super::state::{AttributeSource, VertexInputState, source};
 use crate::abi::error::Error;
 use crate::device::Device;
 use crate::physical_device::limits;
@@ -46,7 +46,7 @@ pub(crate) fn translate(
 /// # Errors
 /// [`Error::InvalidUsage`] for a location that no attribute feeds, or one with numbers of another kind.
 pub(crate) fn attributes(
-    info: &GraphicsState,
+    info: &VertexInputState,
     locations: &[(u32, ScalarType)],
 ) -> Result<Vec<AttributeSource>, Error> {
     let source = |&(location, _): &(u32, ScalarType)| {

@@ -16,8 +16,8 @@ use gaurast::vk::{
 use simdevice::Format;
 use simdevice::state::gaussian::GaussianState;
 use simdevice::state::{
-    BlendFactor, BlendState, CompareOp, DepthBias, DepthStencil, DepthTest, DrawState, PolygonMode,
-    StencilFace, StencilOp, Topology,
+    BlendEquation, BlendFactor, BlendOp, BlendState, CompareOp, DepthBias, DepthStencil, DepthTest,
+    DrawState, LogicOp, PolygonMode, StencilFace, StencilOp, Topology,
 };
 use std::sync::Arc;
 
@@ -58,6 +58,29 @@ pub(crate) struct VertexInputState<'a> {
     pub(crate) primitive_restart: bool,
 }
 
+/// Vertex bindings and attributes that a command buffer sets.
+#[derive(Debug, Default)]
+pub(crate) struct VertexInput {
+    /// Vertex bindings.
+    pub(crate) bindings: Vec<vk::VertexInputBindingDescription>,
+    /// The number of instances that an element lasts, of bindings that advance by instance.
+    pub(crate) divisors: Vec<vk::VertexInputBindingDivisorDescriptionKHR>,
+    /// Vertex attributes.
+    pub(crate) attributes: Vec<vk::VertexInputAttributeDescription>,
+}
+
+impl VertexInput {
+    /// They as a pipeline has them.
+    pub(crate) fn state(&self) -> VertexInputState<'_> {
+        VertexInputState {
+            bindings: &self.bindings,
+            divisors: &self.divisors,
+            attributes: &self.attributes,
+            ..Default::default()
+        }
+    }
+}
+
 /// The stages before rasterization, viewports, and rasterization.
 #[derive(Default)]
 pub(crate) struct PreRasterizationState<'a> {
@@ -77,6 +100,8 @@ pub(crate) struct PreRasterizationState<'a> {
     pub(crate) provoking_last: bool,
     /// Whether primitives are clipped at the near and far planes, if the pipeline says so.
     pub(crate) depth_clip: Option<bool>,
+    /// How lines are drawn.
+    pub(crate) lines: vk::PipelineRasterizationLineStateCreateInfoKHR<'a>,
 }
 
 /// The fragment stage, and the tests of depth and stencil.
@@ -95,10 +120,12 @@ pub(crate) struct FragmentOutputState<'a> {
     pub(crate) multisample: vk::PipelineMultisampleStateCreateInfo<'a>,
     /// The samples that may be covered.
     pub(crate) sample_mask: u32,
-    /// The logic operation, if it is enabled.
-    pub(crate) logic_op: Option<vk::LogicOp>,
-    /// Blend state by colour attachment.
+    /// The logic operation, and whether it is enabled.
+    pub(crate) logic_op: (vk::LogicOp, bool),
+    /// Blend state by colour attachment; none where all of it is dynamic.
     pub(crate) blend: &'a [vk::PipelineColorBlendAttachmentState],
+    /// Which colour attachments are written at all, if the pipeline says so.
+    pub(crate) color_write_enables: &'a [vk::Bool32],
     /// Blend constants.
     pub(crate) blend_constants: [f32; 4],
     /// The colour formats of the subpass; undefined where the attachment is unused.
@@ -161,6 +188,10 @@ impl<'a> GraphicsState<'a> {
                 >(state.p_next);
                 gathered.pre_rasterization.depth_clip =
                     clip.map(|state| state.depth_clip_enable != vk::FALSE);
+                let lines = valid::find_in_chain::<
+                    vk::PipelineRasterizationLineStateCreateInfoKHR<'_>,
+                >(state.p_next);
+                gathered.pre_rasterization.lines = lines.copied().unwrap_or_default();
             }
             if !gathered.discards() {
                 read_fragments(info, &mut gathered)?;
@@ -187,6 +218,38 @@ impl<'a> GraphicsState<'a> {
             .rasterizer_discard_enable
             != vk::FALSE
             && !self.is_dynamic(vk::DynamicState::RASTERIZER_DISCARD_ENABLE)
+    }
+
+    /// Tells if all that colour attachments have of their own is dynamic, so that the pipeline has nothing of it.
+    fn has_dynamic_blending(&self) -> bool {
+        use vk::DynamicState as S;
+        [
+            S::COLOR_BLEND_ENABLE_EXT,
+            S::COLOR_BLEND_EQUATION_EXT,
+            S::COLOR_WRITE_MASK_EXT,
+        ]
+        .into_iter()
+        .all(|state| self.is_dynamic(state))
+    }
+
+    /// Fails if an index is to restart a list, which takes the feature `primitiveTopologyListRestart`.
+    ///
+    /// # Errors
+    /// [`Error::InvalidUsage`].
+    pub(super) fn require_no_list_restart(&self) -> Result<(), Error> {
+        use vk::PrimitiveTopology as T;
+        let topology = self.vertex_input.topology;
+        let is_list = matches!(topology, T::POINT_LIST | T::LINE_LIST | T::TRIANGLE_LIST);
+        if !self.vertex_input.primitive_restart
+            || !is_list
+            || self.is_dynamic(vk::DynamicState::PRIMITIVE_TOPOLOGY)
+        {
+            return Ok(());
+        }
+        Err(Error::usage(
+            "VUID-VkPipelineInputAssemblyStateCreateInfo-topology-06252",
+            format!("primitiveRestartEnable is VK_TRUE, but {topology:?} has no restart"),
+        ))
     }
 
     /// The width of lines. Pipelines that draw none often leave it at zero.
@@ -246,7 +309,8 @@ unsafe fn read_fragments<'a>(
         }
         if let Some(state) = valid::optional(info.p_multisample_state) {
             gathered.fragment_output.multisample = *state;
-            if let Some(mask) = valid::optional(state.p_sample_mask) {
+            let is_dynamic = gathered.is_dynamic(vk::DynamicState::SAMPLE_MASK_EXT);
+            if !is_dynamic && let Some(mask) = valid::optional(state.p_sample_mask) {
                 gathered.fragment_output.sample_mask = *mask;
             }
         }
@@ -258,9 +322,19 @@ unsafe fn read_fragments<'a>(
             && let Some(state) = valid::optional(info.p_color_blend_state)
         {
             gathered.fragment_output.logic_op =
-                (state.logic_op_enable != vk::FALSE).then_some(state.logic_op);
-            gathered.fragment_output.blend =
-                valid::slice(state.p_attachments, state.attachment_count)?;
+                (state.logic_op, state.logic_op_enable != vk::FALSE);
+            if !gathered.has_dynamic_blending() {
+                gathered.fragment_output.blend =
+                    valid::slice(state.p_attachments, state.attachment_count)?;
+            }
+            let writes =
+                valid::find_in_chain::<vk::PipelineColorWriteCreateInfoEXT<'_>>(state.p_next);
+            if let Some(writes) = writes
+                && !gathered.is_dynamic(vk::DynamicState::COLOR_WRITE_ENABLE_EXT)
+            {
+                gathered.fragment_output.color_write_enables =
+                    valid::slice(writes.p_color_write_enables, writes.attachment_count)?;
+            }
             gathered.fragment_output.blend_constants = state.blend_constants;
         }
         gathered.fragment_output.color_formats = formats.color;
@@ -381,7 +455,7 @@ pub(crate) fn attribute(
             format!("{name} is location {location}, {what}"),
         )
     };
-    let source = source(info, location).map_err(refuse)?;
+    let source = source(&info.vertex_input, location).map_err(refuse)?;
     let format = source.format;
     if format.is_integer() {
         return Err(refuse(format!(
@@ -400,19 +474,11 @@ pub(crate) fn attribute(
 ///
 /// # Errors
 /// The fault of an attribute, as the end of a sentence about its location.
-pub(crate) fn source(info: &GraphicsState, location: u32) -> Result<AttributeSource, String> {
-    let attribute = info
-        .vertex_input
-        .attributes
-        .iter()
-        .find(|a| a.location == location);
+pub(crate) fn source(info: &VertexInputState, location: u32) -> Result<AttributeSource, String> {
+    let attribute = info.attributes.iter().find(|a| a.location == location);
     let attribute = attribute.ok_or("which the vertex input state does not have")?;
     let number = attribute.binding;
-    let binding = info
-        .vertex_input
-        .bindings
-        .iter()
-        .find(|b| b.binding == number);
+    let binding = info.bindings.iter().find(|b| b.binding == number);
     let binding = binding
         .ok_or_else(|| format!("whose binding {number} the vertex input state does not have"))?;
     let features = formats::properties(attribute.format).buffer_features;
@@ -427,11 +493,7 @@ pub(crate) fn source(info: &GraphicsState, location: u32) -> Result<AttributeSou
     let instance_divisor = match binding.input_rate {
         vk::VertexInputRate::VERTEX => None,
         vk::VertexInputRate::INSTANCE => {
-            let given = info
-                .vertex_input
-                .divisors
-                .iter()
-                .find(|it| it.binding == number);
+            let given = info.divisors.iter().find(|it| it.binding == number);
             Some(given.map_or(1, |it| it.divisor))
         }
         rate => return Err(format!("whose binding has the unknown rate {rate:?}")),
@@ -445,11 +507,64 @@ pub(crate) fn source(info: &GraphicsState, location: u32) -> Result<AttributeSou
     })
 }
 
-/// The blend state of all colour attachments.
+/// What a colour attachment has of its own.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct AttachmentState {
+    /// Blending, if it is on, of colour and alpha.
+    pub(super) blend_enable: bool,
+    pub(super) equations: BlendEquations,
+    /// The components that are written, a bit each, if any are.
+    pub(super) write_mask: u8,
+    pub(super) write_enable: bool,
+}
+
+/// The equations of colour and alpha.
+pub(crate) type BlendEquations = (BlendEquation, BlendEquation);
+
+/// The equation that takes the source.
+const REPLACE: BlendEquation = BlendEquation {
+    source: BlendFactor::One,
+    destination: BlendFactor::Zero,
+    op: BlendOp::Add,
+};
+
+impl AttachmentState {
+    /// What is written as it is.
+    const WRITTEN: Self = Self {
+        blend_enable: false,
+        equations: (REPLACE, REPLACE),
+        write_mask: 0xf,
+        write_enable: true,
+    };
+
+    /// The state for the device.
+    fn blend_state(self) -> BlendState {
+        BlendState {
+            equations: self.blend_enable.then_some(self.equations),
+            write_mask: if self.write_enable {
+                self.write_mask
+            } else {
+                0
+            },
+        }
+    }
+}
+
+/// The state of all colour attachments.
 ///
 /// # Errors
 /// An [`Error`] if there are not as many as attachments, or for what the device lacks.
-pub(crate) fn blend_states(info: &GraphicsState) -> Result<Vec<BlendState>, Error> {
+fn attachment_states(info: &GraphicsState) -> Result<Vec<AttachmentState>, Error> {
+    let enables = info.fragment_output.color_write_enables;
+    let with_enables = |index: usize, state: AttachmentState| AttachmentState {
+        write_enable: enables.get(index).is_none_or(|&enable| enable != vk::FALSE),
+        ..state
+    };
+    if info.has_dynamic_blending() {
+        let count = info.fragment_output.color_formats.len();
+        let states = (0..count).map(|index| with_enables(index, AttachmentState::WRITTEN));
+        return Ok(states.collect());
+    }
     if info.fragment_output.blend.len() != info.fragment_output.color_formats.len() {
         return Err(Error::usage(
             "VUID-VkGraphicsPipelineCreateInfo-renderPass-07609",
@@ -460,10 +575,23 @@ pub(crate) fn blend_states(info: &GraphicsState) -> Result<Vec<BlendState>, Erro
             ),
         ));
     }
-    info.fragment_output
-        .blend
-        .iter()
-        .map(convert::blend_state)
+    let given = info.fragment_output.blend.iter().enumerate();
+    given
+        .map(|(index, given)| {
+            let blend_enable = given.blend_enable != vk::FALSE;
+            let mut state = AttachmentState {
+                blend_enable,
+                write_mask: convert::write_mask(given.color_write_mask),
+                ..AttachmentState::WRITTEN
+            };
+            // What isn't used may hold anything.
+            let may_blend =
+                blend_enable || info.is_dynamic(vk::DynamicState::COLOR_BLEND_ENABLE_EXT);
+            if may_blend && !info.is_dynamic(vk::DynamicState::COLOR_BLEND_EQUATION_EXT) {
+                state.equations = convert::blend_equations(given)?;
+            }
+            Ok(with_enables(index, state))
+        })
         .collect()
 }
 
@@ -495,7 +623,7 @@ macro_rules! supported {
 /// The state of a pipeline, or of a draw.
 #[derive(Clone, Debug)]
 pub(crate) struct FixedFunctionState {
-    /// All but depth bias, depth and stencil.
+    /// All but depth bias, depth, stencil, logic operations and what colour attachments have of their own.
     pub(crate) draw: DrawState,
     pub(super) depth_bias_enable: bool,
     pub(super) depth_bias: DepthBias,
@@ -508,6 +636,9 @@ pub(crate) struct FixedFunctionState {
     pub(super) stencil: [StencilFace; 2],
     /// What Gaussians are drawn by, if the pipeline draws Gaussians.
     pub(super) gaussian: Option<Box<GaussianState>>,
+    pub(super) logic_op_enable: bool,
+    pub(super) logic_op: LogicOp,
+    pub(super) attachments: Vec<AttachmentState>,
 }
 
 /// The ids of the rules on the operations of `VkStencilOpState`.
@@ -586,25 +717,30 @@ impl FixedFunctionState {
                 "depthBiasClamp",
             ),
             (
+                !matches!(
+                    info.pre_rasterization.lines.line_rasterization_mode,
+                    vk::LineRasterizationModeKHR::DEFAULT
+                        | vk::LineRasterizationModeKHR::RECTANGULAR
+                ),
+                (
+                    SUPPORTED.bresenham_lines && SUPPORTED.smooth_lines,
+                    "bresenhamLines or smoothLines",
+                ),
+                "a line rasterization mode but DEFAULT and RECTANGULAR",
+            ),
+            (
+                info.pre_rasterization.lines.stippled_line_enable != vk::FALSE
+                    && !info.is_dynamic(vk::DynamicState::LINE_STIPPLE_ENABLE_EXT),
+                supported!(stippled_rectangular_lines),
+                "stippledLineEnable",
+            ),
+            (
                 info.line_width() != 1.0,
                 supported!(wide_lines),
                 "a line width but 1",
             ),
         ];
         require_all(&needs)?;
-        let is_list = matches!(
-            topology,
-            Topology::PointList | Topology::LineList | Topology::TriangleList
-        );
-        if info.vertex_input.primitive_restart
-            && is_list
-            && !info.is_dynamic(vk::DynamicState::PRIMITIVE_TOPOLOGY)
-        {
-            return Err(Error::usage(
-                "VUID-VkPipelineInputAssemblyStateCreateInfo-topology-06252",
-                format!("primitiveRestartEnable is VK_TRUE, but {topology:?} has no restart"),
-            ));
-        }
         let draw = DrawState {
             topology,
             primitive_restart: info.vertex_input.primitive_restart,
@@ -650,6 +786,9 @@ impl FixedFunctionState {
             stencil_test: false,
             stencil: [KEEP; 2],
             gaussian: None,
+            logic_op_enable: false,
+            logic_op: LogicOp::Copy,
+            attachments: Vec::new(),
         };
         state.set_cull_mode(raster.cull_mode);
         state.set_front_face(raster.front_face);
@@ -800,11 +939,15 @@ impl FixedFunctionState {
     }
 
     fn set_blend(&mut self, info: &GraphicsState) -> Result<(), Error> {
-        if let Some(op) = info.fragment_output.logic_op {
-            require_all(&[(true, supported!(logic_op), "logicOpEnable")])?;
-            self.draw.logic_op = Some(convert::logic_op(op)?);
+        let (op, enable) = info.fragment_output.logic_op;
+        require_all(&[(enable, supported!(logic_op), "logicOpEnable")])?;
+        self.logic_op_enable = enable;
+        // What isn't used may hold anything.
+        let may_operate = enable || info.is_dynamic(vk::DynamicState::LOGIC_OP_ENABLE_EXT);
+        if may_operate && !info.is_dynamic(vk::DynamicState::LOGIC_OP_EXT) {
+            self.logic_op = convert::logic_op(op)?;
         }
-        self.draw.blend = blend_states(info)?;
+        self.attachments = attachment_states(info)?;
         self.draw.blend_constants = info.fragment_output.blend_constants;
         Ok(())
     }
@@ -855,7 +998,33 @@ impl FixedFunctionState {
 
     /// Tells if an attachment is blended by the constants.
     pub(super) fn blends_by_constants(&self) -> bool {
-        self.rasterizes() && self.draw.logic_op.is_none() && blends_by_constants(&self.draw)
+        self.rasterizes() && !self.logic_op_enable && blends_by_constants(&self.attachments)
+    }
+
+    /// Tells if a logic operation replaces blending.
+    pub(super) fn operates(&self) -> bool {
+        self.rasterizes() && self.logic_op_enable
+    }
+
+    /// Tells if there are colour attachments that fragments are written to.
+    pub(super) fn has_colors(&self) -> bool {
+        self.rasterizes() && !self.attachments.is_empty()
+    }
+
+    /// Tells if a colour attachment is blended.
+    pub(super) fn blends(&self) -> bool {
+        self.rasterizes()
+            && self
+                .attachments
+                .iter()
+                .any(|attachment| attachment.blend_enable)
+    }
+
+    /// Changes what a colour attachment has of its own, if there is such a one.
+    pub(super) fn set_attachment(&mut self, index: usize, set: impl FnOnce(&mut AttachmentState)) {
+        if let Some(attachment) = self.attachments.get_mut(index) {
+            set(attachment);
+        }
     }
 
     /// Tells if Gaussians are drawn.
@@ -892,15 +1061,20 @@ impl FixedFunctionState {
                 bounds: self.depth_bounds_test.then_some(self.depth_bounds),
                 stencil: self.stencil_test.then_some(self.stencil),
             },
+            logic_op: self.logic_op_enable.then_some(self.logic_op),
+            blend: self.attachments.iter().map(|it| it.blend_state()).collect(),
             ..self.draw.clone()
         }
     }
 }
 
 /// Tells if an attachment is blended by the constants.
-fn blends_by_constants(state: &DrawState) -> bool {
-    let equations = state.blend.iter().filter_map(|blend| blend.equations);
-    equations
+fn blends_by_constants(attachments: &[AttachmentState]) -> bool {
+    let blended = attachments
+        .iter()
+        .filter(|attachment| attachment.blend_enable);
+    blended
+        .map(|attachment| attachment.equations)
         .flat_map(|(color, alpha)| {
             [
                 color.source,
@@ -963,11 +1137,17 @@ fn require_all(needs: &[(bool, (bool, &str), &str)]) -> Result<(), Error> {
 
 /// For each colour attachment, whether anything comes of its source.
 pub(crate) fn live_color_outputs(info: &GraphicsState, fixed: &FixedFunctionState) -> Vec<bool> {
+    // What is dynamic may be on.
+    let any_mask = info.is_dynamic(vk::DynamicState::COLOR_WRITE_MASK_EXT);
     let mut live_outputs: Vec<_> =
-        std::iter::zip(&fixed.draw.blend, &info.fragment_output.color_formats)
-            .map(|(blend, format)| blend.write_mask != 0 && *format != vk::Format::UNDEFINED)
+        std::iter::zip(&fixed.attachments, &info.fragment_output.color_formats)
+            .map(|(attachment, format)| {
+                (any_mask || attachment.write_mask != 0) && *format != vk::Format::UNDEFINED
+            })
             .collect();
-    if fixed.draw.alpha_to_coverage {
+    if fixed.draw.alpha_to_coverage
+        || info.is_dynamic(vk::DynamicState::ALPHA_TO_COVERAGE_ENABLE_EXT)
+    {
         match live_outputs.first_mut() {
             Some(first) => *first = true,
             None => live_outputs.push(true),

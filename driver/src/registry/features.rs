@@ -276,6 +276,8 @@ pub(crate) struct Features {
     pub(crate) border_color_swizzle: bool,
     /// `borderColorSwizzleFromImage`.
     pub(crate) border_color_swizzle_from_image: bool,
+    /// `colorWriteEnable`.
+    pub(crate) color_write_enable: bool,
     /// `customBorderColors`.
     pub(crate) custom_border_colors: bool,
     /// `customBorderColorWithoutFormat`.
@@ -290,8 +292,88 @@ pub(crate) struct Features {
     pub(crate) extended_dynamic_state2_logic_op: bool,
     /// `extendedDynamicState2PatchControlPoints`.
     pub(crate) extended_dynamic_state2_patch_control_points: bool,
+    /// `extendedDynamicState3TessellationDomainOrigin`.
+    pub(crate) extended_dynamic_state3_tessellation_domain_origin: bool,
+    /// `extendedDynamicState3DepthClampEnable`.
+    pub(crate) extended_dynamic_state3_depth_clamp_enable: bool,
+    /// `extendedDynamicState3PolygonMode`.
+    pub(crate) extended_dynamic_state3_polygon_mode: bool,
+    /// `extendedDynamicState3RasterizationSamples`.
+    pub(crate) extended_dynamic_state3_rasterization_samples: bool,
+    /// `extendedDynamicState3SampleMask`.
+    pub(crate) extended_dynamic_state3_sample_mask: bool,
+    /// `extendedDynamicState3AlphaToCoverageEnable`.
+    pub(crate) extended_dynamic_state3_alpha_to_coverage_enable: bool,
+    /// `extendedDynamicState3AlphaToOneEnable`.
+    pub(crate) extended_dynamic_state3_alpha_to_one_enable: bool,
+    /// `extendedDynamicState3LogicOpEnable`.
+    pub(crate) extended_dynamic_state3_logic_op_enable: bool,
+    /// `extendedDynamicState3ColorBlendEnable`.
+    pub(crate) extended_dynamic_state3_color_blend_enable: bool,
+    /// `extendedDynamicState3ColorBlendEquation`.
+    pub(crate) extended_dynamic_state3_color_blend_equation: bool,
+    /// `extendedDynamicState3ColorWriteMask`.
+    pub(crate) extended_dynamic_state3_color_write_mask: bool,
+    /// `extendedDynamicState3RasterizationStream`.
+    pub(crate) extended_dynamic_state3_rasterization_stream: bool,
+    /// `extendedDynamicState3ConservativeRasterizationMode`.
+    pub(crate) extended_dynamic_state3_conservative_rasterization_mode: bool,
+    /// `extendedDynamicState3ExtraPrimitiveOverestimationSize`.
+    pub(crate) extended_dynamic_state3_extra_primitive_overestimation_size: bool,
+    /// `extendedDynamicState3DepthClipEnable`.
+    pub(crate) extended_dynamic_state3_depth_clip_enable: bool,
+    /// `extendedDynamicState3SampleLocationsEnable`.
+    pub(crate) extended_dynamic_state3_sample_locations_enable: bool,
+    /// `extendedDynamicState3ColorBlendAdvanced`.
+    pub(crate) extended_dynamic_state3_color_blend_advanced: bool,
+    /// `extendedDynamicState3ProvokingVertexMode`.
+    pub(crate) extended_dynamic_state3_provoking_vertex_mode: bool,
+    /// `extendedDynamicState3LineRasterizationMode`.
+    pub(crate) extended_dynamic_state3_line_rasterization_mode: bool,
+    /// `extendedDynamicState3LineStippleEnable`.
+    pub(crate) extended_dynamic_state3_line_stipple_enable: bool,
+    /// `extendedDynamicState3DepthClipNegativeOneToOne`.
+    pub(crate) extended_dynamic_state3_depth_clip_negative_one_to_one: bool,
+    /// `extendedDynamicState3ViewportWScalingEnable`.
+    pub(crate) extended_dynamic_state3_viewport_w_scaling_enable: bool,
+    /// `extendedDynamicState3ViewportSwizzle`.
+    pub(crate) extended_dynamic_state3_viewport_swizzle: bool,
+    /// `extendedDynamicState3CoverageToColorEnable`.
+    pub(crate) extended_dynamic_state3_coverage_to_color_enable: bool,
+    /// `extendedDynamicState3CoverageToColorLocation`.
+    pub(crate) extended_dynamic_state3_coverage_to_color_location: bool,
+    /// `extendedDynamicState3CoverageModulationMode`.
+    pub(crate) extended_dynamic_state3_coverage_modulation_mode: bool,
+    /// `extendedDynamicState3CoverageModulationTableEnable`.
+    pub(crate) extended_dynamic_state3_coverage_modulation_table_enable: bool,
+    /// `extendedDynamicState3CoverageModulationTable`.
+    pub(crate) extended_dynamic_state3_coverage_modulation_table: bool,
+    /// `extendedDynamicState3CoverageReductionMode`.
+    pub(crate) extended_dynamic_state3_coverage_reduction_mode: bool,
+    /// `extendedDynamicState3RepresentativeFragmentTestEnable`.
+    pub(crate) extended_dynamic_state3_representative_fragment_test_enable: bool,
+    /// `extendedDynamicState3ShadingRateImageEnable`.
+    pub(crate) extended_dynamic_state3_shading_rate_image_enable: bool,
     /// `indexTypeUint8`.
     pub(crate) index_type_uint8: bool,
+    /// `rectangularLines`.
+    pub(crate) rectangular_lines: bool,
+    /// `bresenhamLines`.
+    pub(crate) bresenham_lines: bool,
+    /// `smoothLines`.
+    pub(crate) smooth_lines: bool,
+    /// `stippledRectangularLines`.
+    pub(crate) stippled_rectangular_lines: bool,
+    /// `stippledBresenhamLines`.
+    pub(crate) stippled_bresenham_lines: bool,
+    /// `stippledSmoothLines`.
+    pub(crate) stippled_smooth_lines: bool,
+    /// `multiDraw`.
+    pub(crate) multi_draw: bool,
+    /// `primitiveTopologyListRestart`.
+    pub(crate) primitive_topology_list_restart: bool,
+    /// `primitiveTopologyPatchListRestart`.
+    pub(crate) primitive_topology_patch_list_restart: bool,
     /// `provokingVertexLast`.
     pub(crate) provoking_vertex_last: bool,
     /// `transformFeedbackPreservesProvokingVertex`.
@@ -308,6 +390,8 @@ pub(crate) struct Features {
     pub(crate) vertex_attribute_instance_rate_divisor: bool,
     /// `vertexAttributeInstanceRateZeroDivisor`.
     pub(crate) vertex_attribute_instance_rate_zero_divisor: bool,
+    /// `vertexInputDynamicState`.
+    pub(crate) vertex_input_dynamic_state: bool,
     /// `gaussianPrimitiveTopology`.
     pub(crate) gaussian_primitive_topology: bool,
     /// `vertexShaderProjection`.
@@ -476,12 +560,30 @@ pub(crate) const SUPPORTED: Features = Features {
     format_a4b4g4r4: true,
     border_color_swizzle: true,
     border_color_swizzle_from_image: true,
+    color_write_enable: true,
     custom_border_colors: true,
     custom_border_color_without_format: true,
     depth_clip_enable: true,
     extended_dynamic_state: true,
     extended_dynamic_state2: true,
+    extended_dynamic_state2_logic_op: true,
+    extended_dynamic_state3_depth_clamp_enable: true,
+    extended_dynamic_state3_polygon_mode: true,
+    extended_dynamic_state3_sample_mask: true,
+    extended_dynamic_state3_alpha_to_coverage_enable: true,
+    extended_dynamic_state3_alpha_to_one_enable: true,
+    extended_dynamic_state3_logic_op_enable: true,
+    extended_dynamic_state3_color_blend_enable: true,
+    extended_dynamic_state3_color_blend_equation: true,
+    extended_dynamic_state3_color_write_mask: true,
+    extended_dynamic_state3_depth_clip_enable: true,
+    extended_dynamic_state3_provoking_vertex_mode: true,
+    extended_dynamic_state3_line_rasterization_mode: true,
+    extended_dynamic_state3_line_stipple_enable: true,
     index_type_uint8: true,
+    rectangular_lines: true,
+    multi_draw: true,
+    primitive_topology_list_restart: true,
     provoking_vertex_last: true,
     robust_buffer_access2: true,
     robust_image_access2: true,
@@ -489,6 +591,7 @@ pub(crate) const SUPPORTED: Features = Features {
     texel_buffer_alignment: true,
     vertex_attribute_instance_rate_divisor: true,
     vertex_attribute_instance_rate_zero_divisor: true,
+    vertex_input_dynamic_state: true,
     gaussian_primitive_topology: true,
     vertex_shader_projection: true,
     resolve_fragment_shader: true,
@@ -656,6 +759,7 @@ impl Features {
         format_a4b4g4r4: false,
         border_color_swizzle: false,
         border_color_swizzle_from_image: false,
+        color_write_enable: false,
         custom_border_colors: false,
         custom_border_color_without_format: false,
         depth_clip_enable: false,
@@ -663,7 +767,47 @@ impl Features {
         extended_dynamic_state2: false,
         extended_dynamic_state2_logic_op: false,
         extended_dynamic_state2_patch_control_points: false,
+        extended_dynamic_state3_tessellation_domain_origin: false,
+        extended_dynamic_state3_depth_clamp_enable: false,
+        extended_dynamic_state3_polygon_mode: false,
+        extended_dynamic_state3_rasterization_samples: false,
+        extended_dynamic_state3_sample_mask: false,
+        extended_dynamic_state3_alpha_to_coverage_enable: false,
+        extended_dynamic_state3_alpha_to_one_enable: false,
+        extended_dynamic_state3_logic_op_enable: false,
+        extended_dynamic_state3_color_blend_enable: false,
+        extended_dynamic_state3_color_blend_equation: false,
+        extended_dynamic_state3_color_write_mask: false,
+        extended_dynamic_state3_rasterization_stream: false,
+        extended_dynamic_state3_conservative_rasterization_mode: false,
+        extended_dynamic_state3_extra_primitive_overestimation_size: false,
+        extended_dynamic_state3_depth_clip_enable: false,
+        extended_dynamic_state3_sample_locations_enable: false,
+        extended_dynamic_state3_color_blend_advanced: false,
+        extended_dynamic_state3_provoking_vertex_mode: false,
+        extended_dynamic_state3_line_rasterization_mode: false,
+        extended_dynamic_state3_line_stipple_enable: false,
+        extended_dynamic_state3_depth_clip_negative_one_to_one: false,
+        extended_dynamic_state3_viewport_w_scaling_enable: false,
+        extended_dynamic_state3_viewport_swizzle: false,
+        extended_dynamic_state3_coverage_to_color_enable: false,
+        extended_dynamic_state3_coverage_to_color_location: false,
+        extended_dynamic_state3_coverage_modulation_mode: false,
+        extended_dynamic_state3_coverage_modulation_table_enable: false,
+        extended_dynamic_state3_coverage_modulation_table: false,
+        extended_dynamic_state3_coverage_reduction_mode: false,
+        extended_dynamic_state3_representative_fragment_test_enable: false,
+        extended_dynamic_state3_shading_rate_image_enable: false,
         index_type_uint8: false,
+        rectangular_lines: false,
+        bresenham_lines: false,
+        smooth_lines: false,
+        stippled_rectangular_lines: false,
+        stippled_bresenham_lines: false,
+        stippled_smooth_lines: false,
+        multi_draw: false,
+        primitive_topology_list_restart: false,
+        primitive_topology_patch_list_restart: false,
         provoking_vertex_last: false,
         transform_feedback_preserves_provoking_vertex: false,
         robust_buffer_access2: false,
@@ -672,6 +816,7 @@ impl Features {
         texel_buffer_alignment: false,
         vertex_attribute_instance_rate_divisor: false,
         vertex_attribute_instance_rate_zero_divisor: false,
+        vertex_input_dynamic_state: false,
         gaussian_primitive_topology: false,
         vertex_shader_projection: false,
         resolve_fragment_shader: false,
@@ -704,7 +849,7 @@ impl Features {
     };
 
     /// The features by their names in Rust.
-    pub(crate) fn list(&self) -> [(&'static str, bool); 178] {
+    pub(crate) fn list(&self) -> [(&'static str, bool); 220] {
         [
             ("robust_buffer_access", self.robust_buffer_access),
             ("full_draw_index_uint32", self.full_draw_index_uint32),
@@ -1019,6 +1164,7 @@ impl Features {
                 "border_color_swizzle_from_image",
                 self.border_color_swizzle_from_image,
             ),
+            ("color_write_enable", self.color_write_enable),
             ("custom_border_colors", self.custom_border_colors),
             (
                 "custom_border_color_without_format",
@@ -1035,7 +1181,149 @@ impl Features {
                 "extended_dynamic_state2_patch_control_points",
                 self.extended_dynamic_state2_patch_control_points,
             ),
+            (
+                "extended_dynamic_state3_tessellation_domain_origin",
+                self.extended_dynamic_state3_tessellation_domain_origin,
+            ),
+            (
+                "extended_dynamic_state3_depth_clamp_enable",
+                self.extended_dynamic_state3_depth_clamp_enable,
+            ),
+            (
+                "extended_dynamic_state3_polygon_mode",
+                self.extended_dynamic_state3_polygon_mode,
+            ),
+            (
+                "extended_dynamic_state3_rasterization_samples",
+                self.extended_dynamic_state3_rasterization_samples,
+            ),
+            (
+                "extended_dynamic_state3_sample_mask",
+                self.extended_dynamic_state3_sample_mask,
+            ),
+            (
+                "extended_dynamic_state3_alpha_to_coverage_enable",
+                self.extended_dynamic_state3_alpha_to_coverage_enable,
+            ),
+            (
+                "extended_dynamic_state3_alpha_to_one_enable",
+                self.extended_dynamic_state3_alpha_to_one_enable,
+            ),
+            (
+                "extended_dynamic_state3_logic_op_enable",
+                self.extended_dynamic_state3_logic_op_enable,
+            ),
+            (
+                "extended_dynamic_state3_color_blend_enable",
+                self.extended_dynamic_state3_color_blend_enable,
+            ),
+            (
+                "extended_dynamic_state3_color_blend_equation",
+                self.extended_dynamic_state3_color_blend_equation,
+            ),
+            (
+                "extended_dynamic_state3_color_write_mask",
+                self.extended_dynamic_state3_color_write_mask,
+            ),
+            (
+                "extended_dynamic_state3_rasterization_stream",
+                self.extended_dynamic_state3_rasterization_stream,
+            ),
+            (
+                "extended_dynamic_state3_conservative_rasterization_mode",
+                self.extended_dynamic_state3_conservative_rasterization_mode,
+            ),
+            (
+                "extended_dynamic_state3_extra_primitive_overestimation_size",
+                self.extended_dynamic_state3_extra_primitive_overestimation_size,
+            ),
+            (
+                "extended_dynamic_state3_depth_clip_enable",
+                self.extended_dynamic_state3_depth_clip_enable,
+            ),
+            (
+                "extended_dynamic_state3_sample_locations_enable",
+                self.extended_dynamic_state3_sample_locations_enable,
+            ),
+            (
+                "extended_dynamic_state3_color_blend_advanced",
+                self.extended_dynamic_state3_color_blend_advanced,
+            ),
+            (
+                "extended_dynamic_state3_provoking_vertex_mode",
+                self.extended_dynamic_state3_provoking_vertex_mode,
+            ),
+            (
+                "extended_dynamic_state3_line_rasterization_mode",
+                self.extended_dynamic_state3_line_rasterization_mode,
+            ),
+            (
+                "extended_dynamic_state3_line_stipple_enable",
+                self.extended_dynamic_state3_line_stipple_enable,
+            ),
+            (
+                "extended_dynamic_state3_depth_clip_negative_one_to_one",
+                self.extended_dynamic_state3_depth_clip_negative_one_to_one,
+            ),
+            (
+                "extended_dynamic_state3_viewport_w_scaling_enable",
+                self.extended_dynamic_state3_viewport_w_scaling_enable,
+            ),
+            (
+                "extended_dynamic_state3_viewport_swizzle",
+                self.extended_dynamic_state3_viewport_swizzle,
+            ),
+            (
+                "extended_dynamic_state3_coverage_to_color_enable",
+                self.extended_dynamic_state3_coverage_to_color_enable,
+            ),
+            (
+                "extended_dynamic_state3_coverage_to_color_location",
+                self.extended_dynamic_state3_coverage_to_color_location,
+            ),
+            (
+                "extended_dynamic_state3_coverage_modulation_mode",
+                self.extended_dynamic_state3_coverage_modulation_mode,
+            ),
+            (
+                "extended_dynamic_state3_coverage_modulation_table_enable",
+                self.extended_dynamic_state3_coverage_modulation_table_enable,
+            ),
+            (
+                "extended_dynamic_state3_coverage_modulation_table",
+                self.extended_dynamic_state3_coverage_modulation_table,
+            ),
+            (
+                "extended_dynamic_state3_coverage_reduction_mode",
+                self.extended_dynamic_state3_coverage_reduction_mode,
+            ),
+            (
+                "extended_dynamic_state3_representative_fragment_test_enable",
+                self.extended_dynamic_state3_representative_fragment_test_enable,
+            ),
+            (
+                "extended_dynamic_state3_shading_rate_image_enable",
+                self.extended_dynamic_state3_shading_rate_image_enable,
+            ),
             ("index_type_uint8", self.index_type_uint8),
+            ("rectangular_lines", self.rectangular_lines),
+            ("bresenham_lines", self.bresenham_lines),
+            ("smooth_lines", self.smooth_lines),
+            (
+                "stippled_rectangular_lines",
+                self.stippled_rectangular_lines,
+            ),
+            ("stippled_bresenham_lines", self.stippled_bresenham_lines),
+            ("stippled_smooth_lines", self.stippled_smooth_lines),
+            ("multi_draw", self.multi_draw),
+            (
+                "primitive_topology_list_restart",
+                self.primitive_topology_list_restart,
+            ),
+            (
+                "primitive_topology_patch_list_restart",
+                self.primitive_topology_patch_list_restart,
+            ),
             ("provoking_vertex_last", self.provoking_vertex_last),
             (
                 "transform_feedback_preserves_provoking_vertex",
@@ -1052,6 +1340,10 @@ impl Features {
             (
                 "vertex_attribute_instance_rate_zero_divisor",
                 self.vertex_attribute_instance_rate_zero_divisor,
+            ),
+            (
+                "vertex_input_dynamic_state",
+                self.vertex_input_dynamic_state,
             ),
             (
                 "gaussian_primitive_topology",
@@ -1568,6 +1860,9 @@ impl Features {
             out.border_color_swizzle = self.border_color_swizzle.into();
             out.border_color_swizzle_from_image = self.border_color_swizzle_from_image.into();
         }
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceColorWriteEnableFeaturesEXT<'_>>() {
+            out.color_write_enable = self.color_write_enable.into();
+        }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceCustomBorderColorFeaturesEXT<'_>>() {
             out.custom_border_colors = self.custom_border_colors.into();
             out.custom_border_color_without_format = self.custom_border_color_without_format.into();
@@ -1587,8 +1882,102 @@ impl Features {
             out.extended_dynamic_state2_patch_control_points =
                 self.extended_dynamic_state2_patch_control_points.into();
         }
+        if let Some(out) =
+            structure.cast::<vk::PhysicalDeviceExtendedDynamicState3FeaturesEXT<'_>>()
+        {
+            out.extended_dynamic_state3_tessellation_domain_origin = self
+                .extended_dynamic_state3_tessellation_domain_origin
+                .into();
+            out.extended_dynamic_state3_depth_clamp_enable =
+                self.extended_dynamic_state3_depth_clamp_enable.into();
+            out.extended_dynamic_state3_polygon_mode =
+                self.extended_dynamic_state3_polygon_mode.into();
+            out.extended_dynamic_state3_rasterization_samples =
+                self.extended_dynamic_state3_rasterization_samples.into();
+            out.extended_dynamic_state3_sample_mask =
+                self.extended_dynamic_state3_sample_mask.into();
+            out.extended_dynamic_state3_alpha_to_coverage_enable =
+                self.extended_dynamic_state3_alpha_to_coverage_enable.into();
+            out.extended_dynamic_state3_alpha_to_one_enable =
+                self.extended_dynamic_state3_alpha_to_one_enable.into();
+            out.extended_dynamic_state3_logic_op_enable =
+                self.extended_dynamic_state3_logic_op_enable.into();
+            out.extended_dynamic_state3_color_blend_enable =
+                self.extended_dynamic_state3_color_blend_enable.into();
+            out.extended_dynamic_state3_color_blend_equation =
+                self.extended_dynamic_state3_color_blend_equation.into();
+            out.extended_dynamic_state3_color_write_mask =
+                self.extended_dynamic_state3_color_write_mask.into();
+            out.extended_dynamic_state3_rasterization_stream =
+                self.extended_dynamic_state3_rasterization_stream.into();
+            out.extended_dynamic_state3_conservative_rasterization_mode = self
+                .extended_dynamic_state3_conservative_rasterization_mode
+                .into();
+            out.extended_dynamic_state3_extra_primitive_overestimation_size = self
+                .extended_dynamic_state3_extra_primitive_overestimation_size
+                .into();
+            out.extended_dynamic_state3_depth_clip_enable =
+                self.extended_dynamic_state3_depth_clip_enable.into();
+            out.extended_dynamic_state3_sample_locations_enable =
+                self.extended_dynamic_state3_sample_locations_enable.into();
+            out.extended_dynamic_state3_color_blend_advanced =
+                self.extended_dynamic_state3_color_blend_advanced.into();
+            out.extended_dynamic_state3_provoking_vertex_mode =
+                self.extended_dynamic_state3_provoking_vertex_mode.into();
+            out.extended_dynamic_state3_line_rasterization_mode =
+                self.extended_dynamic_state3_line_rasterization_mode.into();
+            out.extended_dynamic_state3_line_stipple_enable =
+                self.extended_dynamic_state3_line_stipple_enable.into();
+            out.extended_dynamic_state3_depth_clip_negative_one_to_one = self
+                .extended_dynamic_state3_depth_clip_negative_one_to_one
+                .into();
+            out.extended_dynamic_state3_viewport_w_scaling_enable = self
+                .extended_dynamic_state3_viewport_w_scaling_enable
+                .into();
+            out.extended_dynamic_state3_viewport_swizzle =
+                self.extended_dynamic_state3_viewport_swizzle.into();
+            out.extended_dynamic_state3_coverage_to_color_enable =
+                self.extended_dynamic_state3_coverage_to_color_enable.into();
+            out.extended_dynamic_state3_coverage_to_color_location = self
+                .extended_dynamic_state3_coverage_to_color_location
+                .into();
+            out.extended_dynamic_state3_coverage_modulation_mode =
+                self.extended_dynamic_state3_coverage_modulation_mode.into();
+            out.extended_dynamic_state3_coverage_modulation_table_enable = self
+                .extended_dynamic_state3_coverage_modulation_table_enable
+                .into();
+            out.extended_dynamic_state3_coverage_modulation_table = self
+                .extended_dynamic_state3_coverage_modulation_table
+                .into();
+            out.extended_dynamic_state3_coverage_reduction_mode =
+                self.extended_dynamic_state3_coverage_reduction_mode.into();
+            out.extended_dynamic_state3_representative_fragment_test_enable = self
+                .extended_dynamic_state3_representative_fragment_test_enable
+                .into();
+            out.extended_dynamic_state3_shading_rate_image_enable = self
+                .extended_dynamic_state3_shading_rate_image_enable
+                .into();
+        }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceIndexTypeUint8FeaturesKHR<'_>>() {
             out.index_type_uint8 = self.index_type_uint8.into();
+        }
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceLineRasterizationFeaturesKHR<'_>>() {
+            out.rectangular_lines = self.rectangular_lines.into();
+            out.bresenham_lines = self.bresenham_lines.into();
+            out.smooth_lines = self.smooth_lines.into();
+            out.stippled_rectangular_lines = self.stippled_rectangular_lines.into();
+            out.stippled_bresenham_lines = self.stippled_bresenham_lines.into();
+            out.stippled_smooth_lines = self.stippled_smooth_lines.into();
+        }
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceMultiDrawFeaturesEXT<'_>>() {
+            out.multi_draw = self.multi_draw.into();
+        }
+        if let Some(out) =
+            structure.cast::<vk::PhysicalDevicePrimitiveTopologyListRestartFeaturesEXT<'_>>()
+        {
+            out.primitive_topology_list_restart = self.primitive_topology_list_restart.into();
+            out.primitive_topology_patch_list_restart =
+                self.primitive_topology_patch_list_restart.into();
         }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceProvokingVertexFeaturesEXT<'_>>() {
             out.provoking_vertex_last = self.provoking_vertex_last.into();
@@ -1611,6 +2000,11 @@ impl Features {
                 self.vertex_attribute_instance_rate_divisor.into();
             out.vertex_attribute_instance_rate_zero_divisor =
                 self.vertex_attribute_instance_rate_zero_divisor.into();
+        }
+        if let Some(out) =
+            structure.cast::<vk::PhysicalDeviceVertexInputDynamicStateFeaturesEXT<'_>>()
+        {
+            out.vertex_input_dynamic_state = self.vertex_input_dynamic_state.into();
         }
         if let Some(out) = structure
             .cast::<gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>>(
@@ -2018,6 +2412,11 @@ impl Features {
                 requested.border_color_swizzle_from_image != vk::FALSE;
         }
         if let Some(requested) =
+            valid::cast::<vk::PhysicalDeviceColorWriteEnableFeaturesEXT<'_>>(structure)
+        {
+            self.color_write_enable |= requested.color_write_enable != vk::FALSE;
+        }
+        if let Some(requested) =
             valid::cast::<vk::PhysicalDeviceCustomBorderColorFeaturesEXT<'_>>(structure)
         {
             self.custom_border_colors |= requested.custom_border_colors != vk::FALSE;
@@ -2044,9 +2443,98 @@ impl Features {
                 requested.extended_dynamic_state2_patch_control_points != vk::FALSE;
         }
         if let Some(requested) =
+            valid::cast::<vk::PhysicalDeviceExtendedDynamicState3FeaturesEXT<'_>>(structure)
+        {
+            self.extended_dynamic_state3_tessellation_domain_origin |=
+                requested.extended_dynamic_state3_tessellation_domain_origin != vk::FALSE;
+            self.extended_dynamic_state3_depth_clamp_enable |=
+                requested.extended_dynamic_state3_depth_clamp_enable != vk::FALSE;
+            self.extended_dynamic_state3_polygon_mode |=
+                requested.extended_dynamic_state3_polygon_mode != vk::FALSE;
+            self.extended_dynamic_state3_rasterization_samples |=
+                requested.extended_dynamic_state3_rasterization_samples != vk::FALSE;
+            self.extended_dynamic_state3_sample_mask |=
+                requested.extended_dynamic_state3_sample_mask != vk::FALSE;
+            self.extended_dynamic_state3_alpha_to_coverage_enable |=
+                requested.extended_dynamic_state3_alpha_to_coverage_enable != vk::FALSE;
+            self.extended_dynamic_state3_alpha_to_one_enable |=
+                requested.extended_dynamic_state3_alpha_to_one_enable != vk::FALSE;
+            self.extended_dynamic_state3_logic_op_enable |=
+                requested.extended_dynamic_state3_logic_op_enable != vk::FALSE;
+            self.extended_dynamic_state3_color_blend_enable |=
+                requested.extended_dynamic_state3_color_blend_enable != vk::FALSE;
+            self.extended_dynamic_state3_color_blend_equation |=
+                requested.extended_dynamic_state3_color_blend_equation != vk::FALSE;
+            self.extended_dynamic_state3_color_write_mask |=
+                requested.extended_dynamic_state3_color_write_mask != vk::FALSE;
+            self.extended_dynamic_state3_rasterization_stream |=
+                requested.extended_dynamic_state3_rasterization_stream != vk::FALSE;
+            self.extended_dynamic_state3_conservative_rasterization_mode |=
+                requested.extended_dynamic_state3_conservative_rasterization_mode != vk::FALSE;
+            self.extended_dynamic_state3_extra_primitive_overestimation_size |=
+                requested.extended_dynamic_state3_extra_primitive_overestimation_size != vk::FALSE;
+            self.extended_dynamic_state3_depth_clip_enable |=
+                requested.extended_dynamic_state3_depth_clip_enable != vk::FALSE;
+            self.extended_dynamic_state3_sample_locations_enable |=
+                requested.extended_dynamic_state3_sample_locations_enable != vk::FALSE;
+            self.extended_dynamic_state3_color_blend_advanced |=
+                requested.extended_dynamic_state3_color_blend_advanced != vk::FALSE;
+            self.extended_dynamic_state3_provoking_vertex_mode |=
+                requested.extended_dynamic_state3_provoking_vertex_mode != vk::FALSE;
+            self.extended_dynamic_state3_line_rasterization_mode |=
+                requested.extended_dynamic_state3_line_rasterization_mode != vk::FALSE;
+            self.extended_dynamic_state3_line_stipple_enable |=
+                requested.extended_dynamic_state3_line_stipple_enable != vk::FALSE;
+            self.extended_dynamic_state3_depth_clip_negative_one_to_one |=
+                requested.extended_dynamic_state3_depth_clip_negative_one_to_one != vk::FALSE;
+            self.extended_dynamic_state3_viewport_w_scaling_enable |=
+                requested.extended_dynamic_state3_viewport_w_scaling_enable != vk::FALSE;
+            self.extended_dynamic_state3_viewport_swizzle |=
+                requested.extended_dynamic_state3_viewport_swizzle != vk::FALSE;
+            self.extended_dynamic_state3_coverage_to_color_enable |=
+                requested.extended_dynamic_state3_coverage_to_color_enable != vk::FALSE;
+            self.extended_dynamic_state3_coverage_to_color_location |=
+                requested.extended_dynamic_state3_coverage_to_color_location != vk::FALSE;
+            self.extended_dynamic_state3_coverage_modulation_mode |=
+                requested.extended_dynamic_state3_coverage_modulation_mode != vk::FALSE;
+            self.extended_dynamic_state3_coverage_modulation_table_enable |=
+                requested.extended_dynamic_state3_coverage_modulation_table_enable != vk::FALSE;
+            self.extended_dynamic_state3_coverage_modulation_table |=
+                requested.extended_dynamic_state3_coverage_modulation_table != vk::FALSE;
+            self.extended_dynamic_state3_coverage_reduction_mode |=
+                requested.extended_dynamic_state3_coverage_reduction_mode != vk::FALSE;
+            self.extended_dynamic_state3_representative_fragment_test_enable |=
+                requested.extended_dynamic_state3_representative_fragment_test_enable != vk::FALSE;
+            self.extended_dynamic_state3_shading_rate_image_enable |=
+                requested.extended_dynamic_state3_shading_rate_image_enable != vk::FALSE;
+        }
+        if let Some(requested) =
             valid::cast::<vk::PhysicalDeviceIndexTypeUint8FeaturesKHR<'_>>(structure)
         {
             self.index_type_uint8 |= requested.index_type_uint8 != vk::FALSE;
+        }
+        if let Some(requested) =
+            valid::cast::<vk::PhysicalDeviceLineRasterizationFeaturesKHR<'_>>(structure)
+        {
+            self.rectangular_lines |= requested.rectangular_lines != vk::FALSE;
+            self.bresenham_lines |= requested.bresenham_lines != vk::FALSE;
+            self.smooth_lines |= requested.smooth_lines != vk::FALSE;
+            self.stippled_rectangular_lines |= requested.stippled_rectangular_lines != vk::FALSE;
+            self.stippled_bresenham_lines |= requested.stippled_bresenham_lines != vk::FALSE;
+            self.stippled_smooth_lines |= requested.stippled_smooth_lines != vk::FALSE;
+        }
+        if let Some(requested) =
+            valid::cast::<vk::PhysicalDeviceMultiDrawFeaturesEXT<'_>>(structure)
+        {
+            self.multi_draw |= requested.multi_draw != vk::FALSE;
+        }
+        if let Some(requested) =
+            valid::cast::<vk::PhysicalDevicePrimitiveTopologyListRestartFeaturesEXT<'_>>(structure)
+        {
+            self.primitive_topology_list_restart |=
+                requested.primitive_topology_list_restart != vk::FALSE;
+            self.primitive_topology_patch_list_restart |=
+                requested.primitive_topology_patch_list_restart != vk::FALSE;
         }
         if let Some(requested) =
             valid::cast::<vk::PhysicalDeviceProvokingVertexFeaturesEXT<'_>>(structure)
@@ -2074,6 +2562,11 @@ impl Features {
                 requested.vertex_attribute_instance_rate_divisor != vk::FALSE;
             self.vertex_attribute_instance_rate_zero_divisor |=
                 requested.vertex_attribute_instance_rate_zero_divisor != vk::FALSE;
+        }
+        if let Some(requested) =
+            valid::cast::<vk::PhysicalDeviceVertexInputDynamicStateFeaturesEXT<'_>>(structure)
+        {
+            self.vertex_input_dynamic_state |= requested.vertex_input_dynamic_state != vk::FALSE;
         }
         if let Some(requested) = valid::cast::<
             gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
@@ -2133,6 +2626,9 @@ pub(crate) fn extension_of(structure: vk::StructureType) -> Option<&'static CStr
         vk::PhysicalDeviceBorderColorSwizzleFeaturesEXT::STRUCTURE_TYPE => {
             Some(c"VK_EXT_border_color_swizzle")
         }
+        vk::PhysicalDeviceColorWriteEnableFeaturesEXT::STRUCTURE_TYPE => {
+            Some(c"VK_EXT_color_write_enable")
+        }
         vk::PhysicalDeviceCustomBorderColorFeaturesEXT::STRUCTURE_TYPE => {
             Some(c"VK_EXT_custom_border_color")
         }
@@ -2145,8 +2641,18 @@ pub(crate) fn extension_of(structure: vk::StructureType) -> Option<&'static CStr
         vk::PhysicalDeviceExtendedDynamicState2FeaturesEXT::STRUCTURE_TYPE => {
             Some(c"VK_EXT_extended_dynamic_state2")
         }
+        vk::PhysicalDeviceExtendedDynamicState3FeaturesEXT::STRUCTURE_TYPE => {
+            Some(c"VK_EXT_extended_dynamic_state3")
+        }
         vk::PhysicalDeviceIndexTypeUint8FeaturesKHR::STRUCTURE_TYPE => {
             Some(c"VK_EXT_index_type_uint8")
+        }
+        vk::PhysicalDeviceLineRasterizationFeaturesKHR::STRUCTURE_TYPE => {
+            Some(c"VK_EXT_line_rasterization")
+        }
+        vk::PhysicalDeviceMultiDrawFeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_multi_draw"),
+        vk::PhysicalDevicePrimitiveTopologyListRestartFeaturesEXT::STRUCTURE_TYPE => {
+            Some(c"VK_EXT_primitive_topology_list_restart")
         }
         vk::PhysicalDeviceProvokingVertexFeaturesEXT::STRUCTURE_TYPE => {
             Some(c"VK_EXT_provoking_vertex")
@@ -2157,6 +2663,9 @@ pub(crate) fn extension_of(structure: vk::StructureType) -> Option<&'static CStr
         }
         vk::PhysicalDeviceVertexAttributeDivisorFeaturesKHR::STRUCTURE_TYPE => {
             Some(c"VK_EXT_vertex_attribute_divisor")
+        }
+        vk::PhysicalDeviceVertexInputDynamicStateFeaturesEXT::STRUCTURE_TYPE => {
+            Some(c"VK_EXT_vertex_input_dynamic_state")
         }
         gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST::STRUCTURE_TYPE => {
             Some(c"VK_GAURAST_gaussian_primitive_topology")

@@ -472,6 +472,12 @@ pub(crate) struct Properties {
     pub(crate) max_buffer_size: vk::DeviceSize,
     /// `maxCustomBorderColorSamplers`.
     pub(crate) max_custom_border_color_samplers: u32,
+    /// `dynamicPrimitiveTopologyUnrestricted`.
+    pub(crate) dynamic_primitive_topology_unrestricted: bool,
+    /// `lineSubPixelPrecisionBits`.
+    pub(crate) line_sub_pixel_precision_bits: u32,
+    /// `maxMultiDrawCount`.
+    pub(crate) max_multi_draw_count: u32,
     /// `provokingVertexModePerPipeline`.
     pub(crate) provoking_vertex_mode_per_pipeline: bool,
     /// `transformFeedbackPreservesTriangleFanProvokingVertex`.
@@ -1110,6 +1116,19 @@ impl Properties {
         if let Some(out) = structure.cast::<vk::PhysicalDeviceCustomBorderColorPropertiesEXT<'_>>()
         {
             out.max_custom_border_color_samplers = self.max_custom_border_color_samplers;
+        }
+        if let Some(out) =
+            structure.cast::<vk::PhysicalDeviceExtendedDynamicState3PropertiesEXT<'_>>()
+        {
+            out.dynamic_primitive_topology_unrestricted =
+                self.dynamic_primitive_topology_unrestricted.into();
+        }
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceLineRasterizationPropertiesKHR<'_>>()
+        {
+            out.line_sub_pixel_precision_bits = self.line_sub_pixel_precision_bits;
+        }
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceMultiDrawPropertiesEXT<'_>>() {
+            out.max_multi_draw_count = self.max_multi_draw_count;
         }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceProvokingVertexPropertiesEXT<'_>>() {
             out.provoking_vertex_mode_per_pipeline = self.provoking_vertex_mode_per_pipeline.into();

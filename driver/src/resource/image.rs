@@ -3,7 +3,7 @@
 use super::buffer::{self, fill_requirements};
 use super::memory::Memory;
 use crate::abi::error::Error;
-use crate::abi::handle::{self, objects};
+use crate::abi::handle::objects;
 use crate::abi::valid::{OutputChain, Structures};
 use crate::convert;
 use crate::physical_device::formats::{self, ImageQuery};
@@ -42,6 +42,11 @@ impl Image {
             size,
             bound: OnceLock::new(),
         })
+    }
+
+    /// The bytes of memory that it needs.
+    pub(crate) fn size(&self) -> u64 {
+        self.size
     }
 
     /// The memory that it needs, of any type.
@@ -174,8 +179,11 @@ fn unsupported_format(format: vk::Format) -> Error {
     Error::FormatNotSupported(format!("{format:?} is not supported for images"))
 }
 
-/// The image that a create info asks for.
-fn new_image(
+/// The image that a create info asks for, not yet bound to memory.
+///
+/// # Errors
+/// [`Error::FormatNotSupported`] or [`Error::InvalidUsage`] if there can be no such image.
+pub(crate) fn new_image(
     info: &vk::ImageCreateInfo<'_>,
     external: Option<&vk::ExternalMemoryImageCreateInfo<'_>>,
     stencil: Option<&vk::ImageStencilUsageCreateInfo<'_>>,
@@ -313,19 +321,6 @@ pub(crate) fn bind_image_memory(
     memory_offset: vk::DeviceSize,
 ) -> Result<(), Error> {
     image.bind(Arc::clone(memory.allocation()), memory_offset)
-}
-
-/// # Safety
-/// The handles are live.
-#[doc(alias = "vkBindImageMemory2")]
-pub(crate) unsafe fn bind_image_memory2(
-    bind_infos: &[vk::BindImageMemoryInfo<'_>],
-) -> Result<(), Error> {
-    bind_infos.iter().try_for_each(|info| {
-        // SAFETY: the caller's promise.
-        let (image, memory) = unsafe { (handle::get(info.image)?, handle::get(info.memory)?) };
-        bind_image_memory(image, memory, info.memory_offset)
-    })
 }
 
 #[doc(alias = "vkCreateImageView")]

@@ -112,12 +112,12 @@ fn what_is_not_there_is_refused() {
         let error = context.device(extensions, features).err();
         (error, heard.take())
     };
-    let (error, messages) = refusal(&[c"VK_KHR_swapchain"], &mut Default::default());
+    let (error, messages) = refusal(&[c"VK_EXT_mesh_shader"], &mut Default::default());
     assert_eq!(error, Some(vk::Result::ERROR_EXTENSION_NOT_PRESENT));
     assert!(
         messages
             .iter()
-            .any(|(_, text)| text.contains("VK_KHR_swapchain")),
+            .any(|(_, text)| text.contains("VK_EXT_mesh_shader")),
         "{messages:?}"
     );
 
@@ -143,7 +143,7 @@ fn what_is_not_there_is_refused() {
 
     // SAFETY: the messenger is live and not used again.
     unsafe { debug.destroy_debug_utils_messenger(messenger, None) };
-    let (error, messages) = refusal(&[c"VK_KHR_swapchain"], &mut Default::default());
+    let (error, messages) = refusal(&[c"VK_EXT_mesh_shader"], &mut Default::default());
     assert!(error.is_some() && messages.is_empty());
 }
 
@@ -152,7 +152,7 @@ fn an_instance_refuses_what_it_lacks_and_says_so() {
     let entry = vulkan_gaurast::entry();
     let heard = Heard::default();
     let mut messenger = heard.messenger();
-    let names = [c"VK_KHR_surface".as_ptr()];
+    let names = [c"VK_KHR_xcb_surface".as_ptr()];
     let info = vk::InstanceCreateInfo::default()
         .enabled_extension_names(&names)
         .push_next(&mut messenger);
@@ -163,7 +163,7 @@ fn an_instance_refuses_what_it_lacks_and_says_so() {
         heard
             .take()
             .iter()
-            .any(|(_, text)| text.contains("VK_KHR_surface"))
+            .any(|(_, text)| text.contains("VK_KHR_xcb_surface"))
     );
 
     let names = [c"VK_LAYER_KHRONOS_validation".as_ptr()];

@@ -238,9 +238,9 @@ fn state_that_the_device_lacks_is_refused() {
     };
     assert_refused(&gpu, &request, LACKING, "TYPE_8");
     for state in [
-        vk::DynamicState::LOGIC_OP_EXT,
+        vk::DynamicState::RASTERIZATION_SAMPLES_EXT,
         vk::DynamicState::PATCH_CONTROL_POINTS_EXT,
-        vk::DynamicState::VERTEX_INPUT_EXT,
+        vk::DynamicState::TESSELLATION_DOMAIN_ORIGIN_EXT,
     ] {
         let request = Request::default().with_dynamic(state);
         assert_refused(&gpu, &request, LACKING, &format!("{state:?}"));

@@ -6,8 +6,10 @@ use super::state::State;
 use crate::command::DrawParameters;
 use crate::pipeline::GraphicsPipeline;
 use crate::pipeline::primitives::{PrimitivePipeline, ViewportSource};
+use crate::pipeline::stages;
 use crate::pipeline::state::AttributeSource;
 use ash::vk;
+use gaurast_spirv::ScalarType;
 use simdevice::Packet;
 use simdevice::packet::{AttributeStream, BufferRange, IndexStream};
 use simdevice::state::DrawState;
@@ -98,6 +100,9 @@ pub(crate) enum DrawError {
          (VUID-vkCmdDraw-sphericalHarmonicsBuffer-GAURAST)"
     )]
     Harmonics,
+    /// Vertex input that the vertex program cannot read.
+    #[error("vertex input: {0}")]
+    VertexInput(String),
     /// No vertex buffer.
     #[error("no vertex buffer is bound at binding {0}")]
     VertexBuffer(u32),
@@ -131,6 +136,20 @@ pub(super) fn attribute_stream(
     })
 }
 
+/// The sources of attributes that the command buffer has set.
+///
+/// # Errors
+/// [`DrawError::Dynamic`] if it has set none, [`DrawError::VertexInput`] for those that are not as the program reads them.
+fn dynamic_sources(
+    state: &State,
+    locations: &[(u32, ScalarType)],
+) -> Result<Vec<AttributeSource>, DrawError> {
+    let missing = DrawError::Dynamic(vk::DynamicState::VERTEX_INPUT_EXT);
+    let input = state.vertex_input.as_ref().ok_or(missing)?;
+    stages::attributes(&input.state(), locations)
+        .map_err(|error| DrawError::VertexInput(error.to_string()))
+}
+
 /// The stream that an indexed draw's indices are read from.
 ///
 /// # Errors
@@ -161,8 +180,13 @@ pub(super) fn primitives(
     parameters: &DrawParameters,
     draw_index: u32,
 ) -> Result<Packet, DrawError> {
-    let attributes = primitives
-        .attributes
+    let dynamic_sources = match &primitives.dynamic_locations {
+        Some(locations) => Some(dynamic_sources(state, locations)?),
+        None => None,
+    };
+    let attributes = dynamic_sources
+        .as_ref()
+        .unwrap_or(&primitives.attributes)
         .iter()
         .map(|source| attribute_stream(state, pipeline, source));
     let bindings =

@@ -128,6 +128,12 @@ fn execute(
             }
         }
         Command::Draw(parameters) => draw(state, parameters, 0, execution)?,
+        Command::DrawMulti(draws) => {
+            for (index, parameters) in (0..).zip(draws) {
+                draw(state, parameters, index, execution)?;
+            }
+        }
+        Command::SetVertexInput(input) => state.set_vertex_input(input),
         Command::DrawIndirect(indirect) => draw_indirect(state, indirect, execution)?,
         Command::BindComputePipeline(pipeline) => state.compute_pipeline = Some(pipeline.clone()),
         Command::BindSets(bind) => state.sets_mut(bind.bind_point).bind(bind.first, &bind.sets),

@@ -9,6 +9,7 @@ use crate::pipeline::compute::ComputePipeline;
 use crate::pipeline::dynamic_state::DynamicStates;
 use crate::pipeline::gaussian::GaussianPipeline;
 use simdevice::packet::GaussianBegin;
+use crate::pipeline::state::VertexInput;
 use simdevice::state::gaussian::Camera;
 use simdevice::state::{DrawState, Rect, Viewport};
 use std::sync::Arc;
@@ -28,6 +29,8 @@ pub(crate) struct State {
     pub(crate) push_constants: Vec<u8>,
     /// The vertex buffers by binding.
     pub(crate) vertex_buffers: Vec<Option<VertexBuffer>>,
+    /// Vertex bindings and attributes, where they are dynamic.
+    pub(crate) vertex_input: Option<Arc<VertexInput>>,
     /// The index buffer.
     pub(crate) index_buffer: Option<IndexBuffer>,
     /// Dynamic viewports.
@@ -88,6 +91,14 @@ impl State {
             self.push_constants.resize(range.end, 0);
         }
         self.push_constants[range].copy_from_slice(bytes);
+    }
+
+    /// Sets vertex bindings and attributes; the strides are theirs now.
+    pub(crate) fn set_vertex_input(&mut self, input: &Arc<VertexInput>) {
+        self.vertex_input = Some(Arc::clone(input));
+        for bound in self.vertex_buffers.iter_mut().flatten() {
+            bound.stride = None;
+        }
     }
 
     /// The vertex buffer bound at `binding`.

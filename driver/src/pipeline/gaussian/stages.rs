@@ -53,7 +53,7 @@ impl VertexProjection {
         let vertex = stages::translate(device, layout(info)?, stage, Stage::Vertex, 1)?;
         let components = components(state, &vertex.interface)?;
         let locations = vertex.interface.locations_read();
-        let attributes = stages::attributes(info, &locations)?;
+        let attributes = stages::attributes(&info.vertex_input, &locations)?;
         let resources = ProgramResources::new(device, &vertex.interface);
         let stream = |location| locations.iter().position(|(read, _)| *read == location);
         let programs = link::link_projection(vertex, stream, &components)?;

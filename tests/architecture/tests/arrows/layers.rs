@@ -19,6 +19,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("driver/gen", &[]),
     ("driver/spirv", &["simdevice/isa"]),
     ("driver/icd", &["driver"]),
+    ("driver/window", &["driver"]),
     ("driver", &["api/gaurast", "driver/spirv", "simdevice"]),
     ("samples", &["api", "driver", "simdevice/timing"]),
     ("tests/oracle", &["api"]),

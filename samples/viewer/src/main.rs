@@ -1,0 +1,169 @@
+//! A window in which a camera flies around a scene of Gaussians with a mesh in it: plain `ash`, `winit`, and a swapchain.
+
+#![cfg_attr(rustfmt, rustfmt_skip)] // A step a line, so that a few screens show everything.
+
+mod gpu;
+
+use std::f64::consts::TAU;
+use std::time::Instant;
+
+use ash::vk;
+use clap::Parser;
+use gaurast_scene::{Extent, Scene, garden};
+use glam::{DMat4, DVec3, DVec4};
+use gpu::{Gpu, Outcome, Vertex, View};
+use winit::application::ApplicationHandler;
+use winit::dpi::PhysicalSize;
+use winit::event::WindowEvent;
+use winit::event_loop::{ActiveEventLoop, EventLoop};
+use winit::window::{Window, WindowId};
+
+/// Seconds that the camera takes around the scene, and the mesh around itself.
+const ORBIT: f64 = 20.0;
+const TURN: f64 = 6.0;
+
+/// Flies around a scene of Gaussians with a mesh in it.
+#[derive(Parser)]
+struct Arguments {
+    /// The scene; a garden without one.
+    file: Option<std::path::PathBuf>,
+    /// The window's width in pixels.
+    #[arg(long, default_value_t = 1280)]
+    width: u32,
+    /// The window's height in pixels.
+    #[arg(long, default_value_t = 720)]
+    height: u32,
+    /// After so many frames, say how many there were in a second, and end.
+    #[arg(long)]
+    frames: Option<u32>,
+    /// Don't wait for the display.
+    #[arg(long)]
+    immediate: bool,
+    /// Draw with the first driver that the Vulkan loader finds, instead of the one that is linked in.
+    #[arg(long)]
+    loader: bool,
+}
+
+/// The window and what is shown in it, from the first event on.
+struct Viewer {
+    arguments: Arguments,
+    scene: Scene,
+    extent: Extent,
+    /// It goes before the window that it presents to.
+    shown: Option<(Gpu, Window)>,
+    begin: Instant,
+    frames: u32,
+    outcome: Outcome<()>,
+}
+
+impl Viewer {
+    fn open(&mut self, events: &ActiveEventLoop) -> Outcome<()> {
+        let size = PhysicalSize::new(self.arguments.width, self.arguments.height);
+        let window = events.create_window(Window::default_attributes().with_title("GauRast").with_inner_size(size))?;
+        // SAFETY: the system's loader is sound.
+        let entry = if self.arguments.loader { unsafe { ash::Entry::load()? } } else { vulkan_gaurast_window::entry() };
+        let (fifo, immediate) = (vk::PresentModeKHR::FIFO, vk::PresentModeKHR::IMMEDIATE);
+        let mode = if self.arguments.immediate { immediate } else { fifo };
+        self.shown = Some((Gpu::new(entry, &window, mode, &self.scene, &torus())?, window));
+        self.begin = Instant::now();
+        Ok(())
+    }
+
+    fn draw(&mut self, events: &ActiveEventLoop) -> Outcome<()> {
+        let Some((gpu, window)) = &mut self.shown else { return Ok(()) };
+        let PhysicalSize { width, height } = window.inner_size();
+        // There is nothing to draw to while the window is minimized; when it is not, it asks again.
+        if width == 0 || height == 0 {
+            return Ok(());
+        }
+        let seconds = self.begin.elapsed().as_secs_f64();
+        gpu.draw([width, height], &view(&self.extent, seconds, f64::from(height) / f64::from(width)))?;
+        self.frames += 1;
+        if self.arguments.frames == Some(self.frames) {
+            gpu.wait()?;
+            let seconds = self.begin.elapsed().as_secs_f64();
+            println!("{} frames in {seconds:.2} s: {:.2} a second", self.frames, f64::from(self.frames) / seconds);
+            events.exit();
+        }
+        window.request_redraw();
+        Ok(())
+    }
+
+    /// Ends the program where something failed.
+    fn check(&mut self, events: &ActiveEventLoop, outcome: Outcome<()>) {
+        if outcome.is_err() {
+            self.outcome = outcome;
+            events.exit();
+        }
+    }
+}
+
+impl ApplicationHandler for Viewer {
+    fn resumed(&mut self, events: &ActiveEventLoop) {
+        if self.shown.is_none() {
+            let opened = self.open(events);
+            self.check(events, opened);
+        }
+    }
+
+    fn window_event(&mut self, events: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
+        match event {
+            WindowEvent::CloseRequested => events.exit(),
+            WindowEvent::RedrawRequested | WindowEvent::Resized(_) => {
+                let drawn = self.draw(events);
+                self.check(events, drawn);
+            }
+            _ => {}
+        }
+    }
+}
+
+/// The camera after so many seconds: it looks along +z, with x to the right and y downwards, from a circle about the
+/// scene's middle; and the mesh, which turns there.
+fn view(extent: &Extent, seconds: f64, aspect: f64) -> View {
+    let (centre, radius) = (DVec3::from_array(extent.centre), extent.radius());
+    let (sin, cos) = (TAU * seconds / ORBIT).sin_cos();
+    let eye = centre + radius * 1.4 * DVec3::new(sin, -0.35, -cos);
+    let forward = (centre - eye).normalize();
+    let right = DVec3::Y.cross(forward).normalize();
+    let down = forward.cross(right);
+    let rotation = DMat4::from_cols(right.extend(0.0), down.extend(0.0), forward.extend(0.0), DVec4::W);
+    let focal = 1.0 / (0.5 * 50f64.to_radians()).tan();
+    let (near, far) = (extent.near(), 20.0 * radius);
+    let slope = far / (far - near);
+    let projection = DMat4::from_cols(
+        DVec4::X * focal * aspect, DVec4::Y * focal, DVec4::new(0.0, 0.0, slope, 1.0), DVec4::Z * -slope * near,
+    );
+    let turn = TAU * seconds / TURN;
+    let mesh = DMat4::from_translation(centre) * DMat4::from_rotation_y(turn) * DMat4::from_rotation_x(0.5 * turn)
+        * DMat4::from_scale(DVec3::splat(0.22 * radius));
+    View { world_to_view: rotation.transpose() * DMat4::from_translation(-eye), projection, mesh }
+}
+
+/// A ring of radius 1, as triangles.
+fn torus() -> Vec<Vertex> {
+    const AROUND: u32 = 48;
+    const ACROSS: u32 = 24;
+    let vertex = |i: u32, j: u32| {
+        let (sin, cos) = (std::f32::consts::TAU * i as f32 / AROUND as f32).sin_cos();
+        let (up, out) = (std::f32::consts::TAU * j as f32 / ACROSS as f32).sin_cos();
+        let position = [(0.75 + 0.25 * out) * cos, (0.75 + 0.25 * out) * sin, 0.25 * up];
+        [position, [out * cos, out * sin, up]]
+    };
+    let squares = (0..AROUND).flat_map(|i| (0..ACROSS).map(move |j| (i, j)));
+    squares.flat_map(|(i, j)| {
+        [(0, 0), (1, 0), (1, 1), (0, 0), (1, 1), (0, 1)].map(|(di, dj)| vertex(i + di, j + dj))
+    }).collect()
+}
+
+fn main() -> Outcome<()> {
+    let arguments = Arguments::parse();
+    let scene = match &arguments.file {
+        Some(file) => gaurast_scene::open(file)?,
+        None => garden::scene(0, garden::DEFAULT_COUNT),
+    };
+    let (extent, begin) = (Extent::of(&scene), Instant::now());
+    let mut viewer = Viewer { arguments, scene, extent, shown: None, begin, frames: 0, outcome: Ok(()) };
+    EventLoop::new()?.run_app(&mut viewer)?;
+    viewer.outcome
+}

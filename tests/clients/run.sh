@@ -1,0 +1,16 @@
+#!/bin/sh
+# Runs every client: passed, failed, or ignored with the reason. GAURAST_LIBRARY names the driver's library, if it isn't
+# target/release/libvulkan_gaurast.so.
+cd "$(dirname "$0")"
+code=0
+for script in *.sh; do
+    case $script in
+        run.sh | common.sh) ;;
+        *)
+            sh "$script"
+            # What is ignored has said so.
+            case $? in 0 | 77) ;; *) code=1 ;; esac
+            ;;
+    esac
+done
+exit $code

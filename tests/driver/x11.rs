@@ -1,0 +1,291 @@
+//! Windows of X11, on a server without a screen (Xvfb) that each test starts for itself: what is presented is what the window
+//! shows; windows change their size, go away, and so may the server.
+
+use std::io::Read;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use ash::vk;
+use gaurast_runner::Need;
+use x11rb::connection::Connection;
+use x11rb::protocol::xproto::{
+    ConfigureWindowAux, ConnectionExt, CreateWindowAux, ImageFormat, WindowClass,
+};
+use x11rb::rust_connection::RustConnection;
+use x11rb::xcb_ffi::XCBConnection;
+
+use super::window::{Presenter, SIZE, SwapchainOptions};
+
+const XVFB: Need = Need::Program("Xvfb");
+
+/// A server, which ends with the test.
+struct Server {
+    process: Child,
+    display: String,
+}
+
+impl Server {
+    fn start(options: &[&str]) -> Self {
+        let mut process = Command::new("Xvfb")
+            .args(["-displayfd", "1", "-screen", "0", "320x240x24"])
+            .args(options)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("Xvfb starts");
+        // It writes its number when it is ready.
+        let mut output = process.stdout.take().expect("its output");
+        let mut number = String::new();
+        let mut byte = [0];
+        while output.read(&mut byte).expect("its number") == 1 && byte[0] != b'\n' {
+            number.push(byte[0] as char);
+        }
+        assert!(!number.is_empty(), "Xvfb did not start");
+        Self {
+            process,
+            display: format!(":{number}"),
+        }
+    }
+
+    fn stop(&mut self) {
+        // It may have ended by itself.
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        self.stop();
+    }
+}
+
+/// A window on a connection of libxcb, as applications have it.
+struct Window {
+    id: u32,
+    connection: XCBConnection,
+}
+
+impl Window {
+    fn open(server: &Server) -> Self {
+        let display = std::ffi::CString::new(server.display.clone()).expect("a name");
+        let (connection, screen) = XCBConnection::connect(Some(&display)).expect("a connection");
+        let screen = &connection.setup().roots[screen];
+        let id = connection.generate_id().expect("an id");
+        connection
+            .create_window(
+                screen.root_depth,
+                id,
+                screen.root,
+                0,
+                0,
+                SIZE[0] as u16,
+                SIZE[1] as u16,
+                0,
+                WindowClass::INPUT_OUTPUT,
+                screen.root_visual,
+                &CreateWindowAux::new(),
+            )
+            .expect("a window")
+            .check()
+            .expect("a window");
+        connection
+            .map_window(id)
+            .expect("it is shown")
+            .check()
+            .expect("it is shown");
+        Self { id, connection }
+    }
+
+    fn presenter(&self) -> Presenter {
+        Presenter::new(
+            vulkan_gaurast_window::entry(),
+            ash::khr::xcb_surface::NAME,
+            |entry, instance| {
+                let functions = ash::khr::xcb_surface::Instance::new(entry, instance);
+                let info = vk::XcbSurfaceCreateInfoKHR::default()
+                    .connection(self.connection.get_raw_xcb_connection())
+                    .window(self.id);
+                // SAFETY: the connection and the window outlive the surface.
+                unsafe { functions.create_xcb_surface(&info, None) }.expect("a surface")
+            },
+        )
+    }
+
+    fn resize(&self, [width, height]: [u32; 2]) {
+        let size = ConfigureWindowAux::new().width(width).height(height);
+        self.connection
+            .configure_window(self.id, &size)
+            .expect("it is resized")
+            .check()
+            .expect("it is resized");
+    }
+
+    fn destroy(&self) {
+        self.connection
+            .destroy_window(self.id)
+            .expect("it is destroyed")
+            .check()
+            .expect("it is destroyed");
+    }
+}
+
+/// What another client of the server sees of a window of [`SIZE`]: blue, green and red of each pixel.
+fn shown(server: &Server, window: u32) -> Vec<[u8; 3]> {
+    let (connection, _) = RustConnection::connect(Some(&server.display)).expect("a connection");
+    let [width, height] = SIZE.map(|side| side as u16);
+    let image = connection
+        .get_image(ImageFormat::Z_PIXMAP, window, 0, 0, width, height, u32::MAX)
+        .expect("a picture")
+        .reply()
+        .expect("a picture");
+    let pixels = image.data.chunks_exact(4);
+    pixels.map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect()
+}
+
+/// Waits until every pixel of a window is of a colour.
+fn assert_shown(server: &Server, window: u32, color: [u8; 3]) {
+    let end = Instant::now() + Duration::from_secs(20);
+    loop {
+        let pixels = shown(server, window);
+        if pixels.iter().all(|pixel| *pixel == color) {
+            return;
+        }
+        assert!(Instant::now() < end, "{:?}, not {color:?}", pixels[0]);
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+fn what_is_presented_is_shown(options: &[&str]) {
+    let server = Server::start(options);
+    let window = Window::open(&server);
+    let presenter = window.presenter();
+    let can = presenter.capabilities().expect("capabilities");
+    let [width, height] = SIZE;
+    assert_eq!(can.current_extent, vk::Extent2D { width, height });
+    for mode in presenter.modes() {
+        let options = SwapchainOptions {
+            mode,
+            count: 3,
+            ..SwapchainOptions::default()
+        };
+        let swapchain = presenter.swapchain(&options).expect("a swapchain");
+        for (color, bytes) in [
+            ([1.0, 0.2, 0.4, 1.0], [102, 51, 255]),
+            ([0.2, 1.0, 0.0, 1.0], [0, 255, 51]),
+        ] {
+            for _ in 0..5 {
+                assert_eq!(swapchain.frame(color).1, Ok(false), "{mode:?}");
+            }
+            assert_shown(&server, window.id, bytes);
+        }
+    }
+    assert!(
+        window
+            .connection
+            .poll_for_event()
+            .expect("no error")
+            .is_none()
+    );
+}
+
+#[gaurast_runner::test(needs = [XVFB])]
+fn pictures_are_shown_through_shared_memory() {
+    what_is_presented_is_shown(&[]);
+}
+
+#[gaurast_runner::test(needs = [XVFB])]
+fn pictures_are_shown_through_the_connection() {
+    what_is_presented_is_shown(&["-extension", "MIT-SHM"]);
+}
+
+/// 30 frames take half a second and no less where each waits for the display, of 60 Hz.
+#[gaurast_runner::test(needs = [XVFB])]
+fn frames_in_order_are_paced_by_the_display() {
+    let server = Server::start(&[]);
+    let window = Window::open(&server);
+    let presenter = window.presenter();
+    let swapchain = presenter
+        .swapchain(&SwapchainOptions::default())
+        .expect("a swapchain");
+    let begin = Instant::now();
+    for _ in 0..33 {
+        assert_eq!(swapchain.frame([0.5; 4]).1, Ok(false));
+    }
+    // The last ones may still wait.
+    let seconds = begin.elapsed().as_secs_f64();
+    assert!(seconds > 0.4, "{seconds} s");
+}
+
+#[gaurast_runner::test(needs = [XVFB])]
+fn a_window_changes_its_size() {
+    let server = Server::start(&[]);
+    let window = Window::open(&server);
+    let presenter = window.presenter();
+    let options = SwapchainOptions::default();
+    let old = presenter.swapchain(&options).expect("a swapchain");
+    assert_eq!(old.frame([0.0, 0.0, 1.0, 1.0]).1, Ok(false));
+    window.resize([64, 40]);
+    let can = presenter.capabilities().expect("capabilities");
+    assert_eq!(
+        (can.current_extent.width, can.current_extent.height),
+        (64, 40)
+    );
+    assert_eq!(
+        old.acquire(u64::MAX).map(|(_, suboptimal)| suboptimal),
+        Ok(true)
+    );
+    assert_eq!(old.frame([0.0, 1.0, 0.0, 1.0]).1, Ok(true));
+    let options = SwapchainOptions {
+        size: [64, 40],
+        old: old.raw,
+        ..options
+    };
+    let new = presenter.swapchain(&options).expect("a swapchain");
+    drop(old);
+    assert_eq!(new.frame([1.0, 0.0, 0.0, 1.0]).1, Ok(false));
+    assert_shown(&server, window.id, [0, 0, 255]);
+}
+
+/// Presents until the surface is lost, which it must be soon.
+fn assert_lost(swapchain: &super::window::Swapchain<'_>) {
+    let end = Instant::now() + Duration::from_secs(20);
+    while swapchain.frame([0.5; 4]).1 != Err(vk::Result::ERROR_SURFACE_LOST_KHR) {
+        assert!(Instant::now() < end, "it can still be presented to");
+    }
+}
+
+#[gaurast_runner::test(needs = [XVFB])]
+fn a_window_that_is_destroyed_is_a_lost_surface() {
+    let server = Server::start(&[]);
+    let window = Window::open(&server);
+    let presenter = window.presenter();
+    let options = SwapchainOptions::default();
+    let swapchain = presenter.swapchain(&options).expect("a swapchain");
+    assert_eq!(swapchain.frame([0.5; 4]).1, Ok(false));
+    window.destroy();
+    assert_lost(&swapchain);
+    let lost = Err(vk::Result::ERROR_SURFACE_LOST_KHR);
+    assert_eq!(presenter.capabilities().map(|_| ()), lost);
+    drop(swapchain);
+    assert_eq!(presenter.swapchain(&options).map(|_| ()), lost);
+}
+
+#[gaurast_runner::test(needs = [XVFB])]
+fn a_server_that_dies_is_a_lost_surface() {
+    let mut server = Server::start(&[]);
+    let window = Window::open(&server);
+    let presenter = window.presenter();
+    let options = SwapchainOptions {
+        mode: vk::PresentModeKHR::MAILBOX,
+        ..SwapchainOptions::default()
+    };
+    let swapchain = presenter.swapchain(&options).expect("a swapchain");
+    assert_eq!(swapchain.frame([0.5; 4]).1, Ok(false));
+    server.stop();
+    assert_lost(&swapchain);
+    assert_eq!(
+        presenter.capabilities().map(|_| ()),
+        Err(vk::Result::ERROR_SURFACE_LOST_KHR)
+    );
+}
