@@ -324,7 +324,7 @@ impl Gpu {
             device.cmd_begin_rendering(c, &info);
             device.cmd_set_viewport(c, 0, &[vk::Viewport::default().width(width).height(height).max_depth(1.0)]);
             device.cmd_set_scissor(c, 0, &[area]);
-            self.extension.cmd_set_gaussian_camera(c, &camera);
+            self.extension.cmd_set_gaussian_cameras(c, &[camera]);
             device.cmd_push_constants(c, self.layout, vk::ShaderStageFlags::VERTEX, 0, bytemuck::bytes_of(&to_clip));
             for (pipeline, buffers, count) in &self.draws {
                 device.cmd_bind_pipeline(c, vk::PipelineBindPoint::GRAPHICS, *pipeline);

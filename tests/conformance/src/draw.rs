@@ -44,6 +44,8 @@ pub struct Draw {
     pub indices: Vec<u32>,
     /// What is recorded.
     pub calls: Vec<Call>,
+    /// The calls are one set, or several at [`Call::EndSet`]; otherwise each call is a set.
+    pub merged: bool,
     /// Width and height of the attachments, in pixels.
     pub size: [u32; 2],
     /// The viewport, if it is not the whole attachment.
@@ -90,7 +92,7 @@ pub enum Call {
         /// The first vertex and their number.
         vertices: [u32; 2],
     },
-    /// `vkCmdSetScissor` to what it is: the set ends.
+    /// The set ends, and another one begins.
     EndSet,
 }
 
@@ -203,6 +205,7 @@ impl Draw {
                 vertices: [0, count],
                 instances: [0, 1],
             }],
+            merged: false,
             size: SIZE,
             viewport: None,
             scissor: None,

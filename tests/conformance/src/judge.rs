@@ -3,9 +3,7 @@
 use std::collections::BTreeMap;
 
 use ash::vk;
-use gaurast::vk::{
-    GaussianPrecisionGAURAST as Precision, PipelineGaussianStateCreateFlagsGAURAST as Flags,
-};
+use gaurast::vk::GaussianPrecisionGAURAST as Precision;
 use gaurast_oracle::compare::{Limits, Verdict, verdict};
 use gaurast_oracle::oracle::project::project;
 use gaurast_oracle::oracle::{
@@ -195,7 +193,6 @@ type Member = [u32; 2];
 
 /// The sorted sets of a draw, in the order in which ties are broken.
 pub(crate) fn sets(draw: &Draw) -> Vec<Vec<Member>> {
-    let merges = draw.state.flags.contains(Flags::MERGE_DRAWS);
     let (mut sets, mut open) = (Vec::<Vec<Member>>::new(), false);
     for call in &draw.calls {
         let members: Vec<Member> = match *call {
@@ -224,7 +221,7 @@ pub(crate) fn sets(draw: &Draw) -> Vec<Vec<Member>> {
             }
         };
         match sets.last_mut() {
-            Some(set) if open && merges => set.extend(members),
+            Some(set) if open && draw.merged => set.extend(members),
             _ => sets.push(members),
         }
         open = true;

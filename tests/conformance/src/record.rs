@@ -64,7 +64,10 @@ pub fn record(device: &Device, draw: &Draw, stored: &Stored) -> Result<Picture, 
                 ),
                 None => device
                     .gaussian
-                    .cmd_set_gaussian_camera(commands, &draw.camera),
+                    .cmd_set_gaussian_cameras(commands, &[draw.camera]),
+            }
+            if draw.merged {
+                device.gaussian.cmd_begin_gaussian_set(commands);
             }
             for (number, call) in draw.calls.iter().enumerate() {
                 match *call {
@@ -87,8 +90,16 @@ pub fn record(device: &Device, draw: &Draw, stored: &Stored) -> Result<Picture, 
                     Call::Indirect { .. } => {
                         raw.cmd_draw_indirect(commands, parameters.raw, 16 * number as u64, 1, 16);
                     }
-                    Call::EndSet => raw.cmd_set_scissor(commands, 0, &[scissor(draw)]),
+                    Call::EndSet if draw.merged => {
+                        device.gaussian.cmd_end_gaussian_set(commands);
+                        device.gaussian.cmd_begin_gaussian_set(commands);
+                    }
+                    // Each call is a set of its own.
+                    Call::EndSet => {}
                 }
+            }
+            if draw.merged {
+                device.gaussian.cmd_end_gaussian_set(commands);
             }
             raw.cmd_end_rendering(commands);
         }

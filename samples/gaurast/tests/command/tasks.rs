@@ -577,7 +577,7 @@ fn a_programs_pictures_on_two_drivers_are_compared() {
     // In a folder of its own for each driver.
     let output = compare(&["--json"], &format!("{DRAWS} > a.ppm"), &[]);
     assert!(output.status.success(), "{}", text(&output.stderr));
-    let json: serde_json::Value = serde_json::from_str(text(&output.stdout)).expect("JSON");
+    let json: serde_json::Value = serde_json::from_str(&text(&output.stdout)).expect("JSON");
     let picture = &json["pictures"][0];
     assert_eq!(picture["name"], "a");
     assert_eq!(picture["equal"], false);

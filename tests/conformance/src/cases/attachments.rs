@@ -1,10 +1,7 @@
 //! Depth, stencil and multisampling; viewports, scissors, formats and blending.
 
 use ash::vk;
-use gaurast::vk::{
-    GaussianGeometryGAURAST as Geometry, GaussianOrderGAURAST as Order,
-    PipelineGaussianStateCreateFlagsGAURAST as Flags,
-};
+use gaurast::vk::{GaussianGeometryGAURAST as Geometry, GaussianOrderGAURAST as Order};
 
 use super::chapter::Chapter;
 use super::scenes::{Gaussian, ball, cameras, dense, front, layered, many};
@@ -356,11 +353,6 @@ pub(super) fn interactions(chapter: &mut Chapter<'_>) {
         for (format_name, format) in formats {
             let name = if merges { "one_set" } else { "two_sets" };
             chapter.add(format!("{name}.{format_name}"), move || {
-                let flags = if merges {
-                    Flags::MERGE_DRAWS
-                } else {
-                    Flags::empty()
-                };
                 let part = |first, count| Call::Draw {
                     vertices: [first, count],
                     instances: [0, 1],
@@ -369,7 +361,8 @@ pub(super) fn interactions(chapter: &mut Chapter<'_>) {
                     format,
                     behind,
                     calls: vec![part(0, 250), part(250, 250)],
-                    ..Draw::new(dense(46, 0)).in_state(|state| state.flags(flags))
+                    merged: merges,
+                    ..Draw::new(dense(46, 0))
                 }
             });
         }

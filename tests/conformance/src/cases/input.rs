@@ -1,10 +1,7 @@
 //! What is drawn: commands and sets, attributes and what is skipped, model matrices.
 
 use ash::vk;
-use gaurast::vk::{
-    GaussianLinearizationGAURAST as Linearization, GaussianOrderGAURAST as Order,
-    PipelineGaussianStateCreateFlagsGAURAST as Flags,
-};
+use gaurast::vk::{GaussianLinearizationGAURAST as Linearization, GaussianOrderGAURAST as Order};
 use gaurast_oracle::oracle::OracleInstance;
 
 use super::chapter::Chapter;
@@ -79,18 +76,11 @@ pub(super) fn topology(chapter: &mut Chapter<'_>) {
                 }
                 let (calls, indices) = (calls.clone(), indices.clone());
                 let set = if merges { "merged" } else { "apart" };
-                chapter.add(format!("{name}.{order_name}.{set}"), move || {
-                    let flags = if merges {
-                        Flags::MERGE_DRAWS
-                    } else {
-                        Flags::empty()
-                    };
-                    Draw {
-                        calls: calls.clone(),
-                        indices: indices.clone(),
-                        ..Draw::new(layered(21, 0))
-                            .in_state(|state| state.order(order).flags(flags))
-                    }
+                chapter.add(format!("{name}.{order_name}.{set}"), move || Draw {
+                    merged: merges,
+                    calls: calls.clone(),
+                    indices: indices.clone(),
+                    ..Draw::new(layered(21, 0)).in_state(|state| state.order(order))
                 });
             }
         }
