@@ -234,6 +234,21 @@ impl Recorder {
         }
     }
 
+    /// Fails within a set of draws.
+    ///
+    /// # Errors
+    /// [`Error::InvalidUsage`].
+    pub(super) fn require_no_gaussian_set(&self) -> Result<(), Error> {
+        match self.has_gaussian_set {
+            false => Ok(()),
+            true => Err(Error::usage(
+                "VUID-vkCmdBeginGaussianSetGAURAST-set-end",
+                "a set of draws that vkCmdBeginGaussianSetGAURAST has begun must end by vkCmdEndGaussianSetGAURAST \
+                 before its subpass, its dynamic rendering or the command buffer ends, or secondaries are executed",
+            )),
+        }
+    }
+
     /// Tells if it may be begun again without an explicit reset.
     pub(crate) fn is_initial(&self) -> bool {
         self.status == Status::Initial

@@ -39,20 +39,3 @@ pub(crate) fn cmd_end_gaussian_set(recorder: &mut Recorder) -> Result<(), Error>
     recorder.push(Command::EndGaussianSet);
     Ok(())
 }
-
-impl Recorder {
-    /// Fails within a set of draws.
-    ///
-    /// # Errors
-    /// [`Error::InvalidUsage`].
-    pub(super) fn require_no_gaussian_set(&self) -> Result<(), Error> {
-        match self.has_gaussian_set {
-            false => Ok(()),
-            true => Err(Error::usage(
-                "VUID-vkCmdBeginGaussianSetGAURAST-set-end",
-                "a set of draws that vkCmdBeginGaussianSetGAURAST has begun must end by vkCmdEndGaussianSetGAURAST \
-                 before its subpass, its dynamic rendering or the command buffer ends, or secondaries are executed",
-            )),
-        }
-    }
-}

@@ -433,7 +433,7 @@ fn camera_set(
     set_layout: vk::DescriptorSetLayout,
 ) -> Result<vk::DescriptorSet, Error> {
     let data = GaussianCameraDataGAURAST::from(&draw.camera);
-    let mut words = [0_u32; 28];
+    let mut words = [0_u32; 32];
     let eye = data.eye.map(f64::to_bits);
     for (pair, bits) in words.chunks_exact_mut(2).zip(eye) {
         pair.copy_from_slice(&[bits as u32, (bits >> 32) as u32]);
