@@ -26,6 +26,7 @@ need asciidoctor asciidoctor
 need verilator verilator
 need make make
 need yosys yosys
+need xvfb Xvfb
 if ! python3 -m pip --version >/dev/null 2>&1; then missing+=(python3-pip); fi
 if [ ${#missing[@]} -gt 0 ]; then
     if command -v apt-get >/dev/null && [ "$(id -u)" = 0 ]; then
