@@ -25,7 +25,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// How long a swapchain's thread waits for the display before it looks if it should end.
+/// Time that a swapchain's thread waits for the display before it looks if it should end.
 const PATIENCE: Duration = Duration::from_millis(50);
 
 /// A swapchain.

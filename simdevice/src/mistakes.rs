@@ -111,7 +111,7 @@ impl Mistake {
     }
 }
 
-/// What a set begins with, where that is mistaken.
+/// The beginning of a set, where that is mistaken.
 pub(crate) fn begin(begin: &GaussianBegin) -> GaussianBegin {
     let mut begin = begin.clone();
     let state = Arc::make_mut(&mut begin.state);

@@ -100,7 +100,7 @@ pub(crate) struct PreRasterizationState<'a> {
     pub(crate) provoking_last: bool,
     /// Whether primitives are clipped at the near and far planes, if the pipeline says so.
     pub(crate) depth_clip: Option<bool>,
-    /// How lines are drawn.
+    /// The mode in which lines are drawn.
     pub(crate) lines: vk::PipelineRasterizationLineStateCreateInfoKHR<'a>,
 }
 
@@ -124,7 +124,7 @@ pub(crate) struct FragmentOutputState<'a> {
     pub(crate) logic_op: (vk::LogicOp, bool),
     /// Blend state by colour attachment; none where all of it is dynamic.
     pub(crate) blend: &'a [vk::PipelineColorBlendAttachmentState],
-    /// Which colour attachments are written at all, if the pipeline says so.
+    /// Colour attachments that are written at all, if the pipeline says so.
     pub(crate) color_write_enables: &'a [vk::Bool32],
     /// Blend constants.
     pub(crate) blend_constants: [f32; 4],
@@ -507,7 +507,7 @@ pub(crate) fn source(info: &VertexInputState, location: u32) -> Result<Attribute
     })
 }
 
-/// What a colour attachment has of its own.
+/// State that each colour attachment has of its own.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct AttachmentState {
     /// Blending, if it is on, of colour and alpha.
@@ -634,7 +634,7 @@ pub(crate) struct FixedFunctionState {
     pub(super) depth_bounds: (f32, f32),
     pub(super) stencil_test: bool,
     pub(super) stencil: [StencilFace; 2],
-    /// What Gaussians are drawn by, if the pipeline draws Gaussians.
+    /// State of Gaussians, if the pipeline draws them.
     pub(super) gaussian: Option<Box<GaussianState>>,
     pub(super) logic_op_enable: bool,
     pub(super) logic_op: LogicOp,
@@ -1039,7 +1039,7 @@ impl FixedFunctionState {
         }
     }
 
-    /// What Gaussians are drawn by, with the rest of the state that they take.
+    /// State of Gaussians, with the rest of the state that they take.
     pub(crate) fn gaussian_state(&self) -> GaussianState {
         let converted = self.draw_state();
         GaussianState {

@@ -26,7 +26,7 @@ const MANIFEST_FOLDERS: [&str; 4] = [
 /// The shared library of this driver, as `cargo build --release` leaves it beside the command.
 const LIBRARY: &str = "libvulkan_gaurast.so";
 
-/// What stands for the folder of a driver's pictures in the program's arguments.
+/// Text that stands for the folder of a driver's pictures in the program's arguments.
 const PLACEHOLDER: &str = "{}";
 
 /// The step of eight-bit colours from which two neighbouring pixels are an edge.
@@ -120,11 +120,11 @@ pub struct CompareDriversArguments {
 struct Driver {
     name: String,
     manifest: PathBuf,
-    /// Where its pictures go.
+    /// Folder that its pictures go to.
     folder: PathBuf,
 }
 
-/// How much one picture differs between the drivers.
+/// Differences of one picture between the drivers.
 #[derive(Serialize)]
 struct Compared {
     name: String,
@@ -133,7 +133,7 @@ struct Compared {
     equal: bool,
     /// Pixels that differ at all.
     differing_pixels: usize,
-    /// Those of them that lie on an edge.
+    /// Differing pixels that lie on an edge.
     differing_on_edges: usize,
     /// The largest difference of a channel, in steps of 255.
     largest: f64,
@@ -396,7 +396,7 @@ fn write_picture(path: &Path, picture: &Picture) -> Result<(), Error> {
     Ok(gaurast_picture::write(path, picture, Some([0.0; 3]))?)
 }
 
-/// What a person reads of a picture.
+/// The sentence that a person reads of a picture.
 fn sentence(one: &Compared) -> String {
     if one.equal {
         return "equal".to_owned();

@@ -14,14 +14,14 @@ use winit::window::Window;
 pub type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
 const DEPTH: vk::Format = vk::Format::D32_SFLOAT;
-/// Where spherical harmonics begin among the attributes.
+/// First location of the spherical harmonics among the attributes.
 const FIRST_SH: u32 = 4;
 const VISIBLE: vk::MemoryPropertyFlags = vk::MemoryPropertyFlags::HOST_VISIBLE;
 
 /// A mesh's corner: its position and its normal.
 pub type Vertex = [[f32; 3]; 2];
 
-/// What a frame is seen with: a view that looks along +z, its projection, and the mesh's place.
+/// The camera of a frame: a view that looks along +z, its projection, and the mesh's place.
 pub struct View { pub world_to_view: DMat4, pub projection: DMat4, pub mesh: DMat4 }
 
 /// A pipeline, its vertex buffers, and how many vertices they have.

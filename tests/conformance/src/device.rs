@@ -32,7 +32,7 @@ pub struct Device {
     memory: vk::PhysicalDeviceMemoryProperties,
     pub(crate) physical_device: vk::PhysicalDevice,
     pub(crate) instance: ash::Instance,
-    /// What the device offers, all of which is enabled.
+    /// Features that the device offers, all of which are enabled.
     pub features: Features<'static>,
     depth_bounds: bool,
     /// The extension's properties.

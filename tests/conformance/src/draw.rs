@@ -24,7 +24,7 @@ pub const SIZE: [u32; 2] = [107, 83];
 /// One render pass with Gaussian draws, and what it begins with.
 #[derive(Clone, Debug)]
 pub struct Draw {
-    /// What lies in the vertex buffers.
+    /// Contents of the vertex buffers.
     pub scene: SceneBuffers,
     /// Attributes are stored as binary16.
     pub half: bool,
@@ -42,7 +42,7 @@ pub struct Draw {
     pub instances: Option<(vk::VertexInputRate, Vec<OracleInstance>)>,
     /// The index buffer.
     pub indices: Vec<u32>,
-    /// What is recorded.
+    /// Calls that are recorded.
     pub calls: Vec<Call>,
     /// The calls are one set, or several at [`Call::EndSet`]; otherwise each call is a set.
     pub merged: bool,
@@ -56,9 +56,9 @@ pub struct Draw {
     pub area: Option<vk::Rect2D>,
     /// The colour attachment's format, one of [`ColorFormat`]s.
     pub format: ColorFormat,
-    /// What the colour attachment holds before.
+    /// Contents of the colour attachment before the draw.
     pub behind: [f32; 4],
-    /// How fragments are blended.
+    /// Blending of fragments.
     pub blend: Blend,
     /// Components that are written.
     pub write_mask: vk::ColorComponentFlags,
@@ -96,7 +96,7 @@ pub enum Call {
     EndSet,
 }
 
-/// How a fragment reaches the colour attachment.
+/// Ways in which a fragment reaches the colour attachment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Blend {
     /// `ONE`, `ONE_MINUS_SRC_ALPHA`.
@@ -309,7 +309,7 @@ impl Draw {
                 has.uniform_buffer_camera,
                 "uniformBufferCamera",
             ),
-            (!state.flags.is_empty(), has.merged_draws, "mergedDraws"),
+            (self.merged, has.merged_draws, "mergedDraws"),
             (
                 self.instances.is_some(),
                 has.gaussian_instancing,

@@ -5,7 +5,7 @@ use gaurast_oracle::oracle::Stored;
 use crate::device::Error;
 use crate::draw::Draw;
 
-/// What the attachments hold after a draw.
+/// Contents of the attachments after a draw.
 #[derive(Clone, Debug, Default)]
 pub struct Picture {
     /// Colours, row by row; resolved, if there are several samples.
@@ -14,9 +14,9 @@ pub struct Picture {
     pub stored: Stored,
 }
 
-/// What is held against the text: a driver's device, or anything else that draws.
+/// An implementation that is held against the text: a driver's device, or anything else that draws.
 pub trait Implementation {
-    /// What it calls itself.
+    /// Name that it gives itself.
     fn name(&self) -> &str;
 
     /// The first feature, limit or format that a draw needs and it lacks.

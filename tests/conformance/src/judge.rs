@@ -19,12 +19,12 @@ use crate::implementation::Picture;
 /// The distance from the envelope that the extension's text allows, per unit of the greatest colour above 1.
 const CONTRACT: f64 = 5e-6;
 
-/// What the attachments may hold after a draw.
+/// Contents that the attachments may have after a draw.
 #[derive(Clone, Debug)]
 pub struct Expected {
     /// Colours.
     pub color: Reference,
-    /// How far a colour may be from the envelope.
+    /// Distance that a colour may have from the envelope.
     pub distance: f64,
     /// Depths that each pixel may store, `None` where that is not known; empty where none is compared.
     pub depth: Vec<Option<Vec<u32>>>,
@@ -32,7 +32,7 @@ pub struct Expected {
     pub stencil: Vec<Vec<u8>>,
 }
 
-/// What the depth and stencil attachment of a draw holds before.
+/// Contents of the depth and stencil attachment before a draw.
 pub fn stored_before(draw: &Draw) -> Stored {
     let Some(depth) = &draw.depth else {
         return Stored::default();
@@ -113,7 +113,7 @@ pub fn expected(draw: &Draw, before: &Stored) -> Expected {
     }
 }
 
-/// How far a colour may be from the envelope, where none drawn is greater than `greatest`.
+/// Distance that a colour may have from the envelope, where none drawn is greater than `greatest`.
 fn distance(draw: &Draw, greatest: f64, sets: usize) -> f64 {
     let behind = draw.behind.iter().fold(0.0_f32, |most, c| most.max(*c));
     let range = greatest.max(behind.into());
@@ -265,7 +265,7 @@ pub(crate) fn gathered(draw: &Draw, members: &[Member]) -> (SceneBuffers, Vec<Or
     (all, instances)
 }
 
-/// What a colour attachment makes of a colour, up to rounding.
+/// The colour that an attachment makes of a colour, up to rounding.
 fn stored_color(draw: &Draw, color: [f64; 4]) -> [f64; 4] {
     match draw.format {
         ColorFormat::Unorm8 => color.map(|component| component.clamp(0.0, 1.0)),

@@ -27,7 +27,7 @@ struct Arguments {
     /// Writes the results as JUnit's XML
     #[arg(long, value_name = "FILE")]
     junit: Option<PathBuf>,
-    /// Where pictures of failures are written: expected, drawn, and the distance from the envelope
+    /// Folder for pictures of failures: expected, drawn, and the distance from the envelope
     #[arg(long, value_name = "FOLDER", default_value = "conformance-failures")]
     pictures: PathBuf,
     /// Prints every case, not only failures

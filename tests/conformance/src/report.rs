@@ -12,7 +12,7 @@ pub struct Result {
     pub chapter: &'static str,
     /// The name within the chapter.
     pub name: String,
-    /// What came of it.
+    /// Outcome.
     pub outcome: Outcome,
     /// How long it took, the oracle's work included.
     pub time: Duration,

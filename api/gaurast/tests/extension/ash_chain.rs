@@ -72,7 +72,7 @@ fn pipeline_state_chains_with_the_defaults_of_3dgs() {
     assert_eq!(found.transmittance_floor, 1e-4);
 }
 
-/// What the recording function below was called with: command buffer and the eye of each camera.
+/// The calls that the recording function below took: command buffer and the eye of each camera.
 static CALLED: Mutex<Vec<(u64, [f64; 3])>> = Mutex::new(Vec::new());
 
 unsafe extern "system" fn record_cameras(

@@ -179,9 +179,9 @@ fn check_camera(camera: &Camera, gaussian: &GaussianPipeline) -> Result<(), Draw
 enum Cameras<'a> {
     /// One that means nothing.
     None,
-    /// Those that a command has set.
+    /// Cameras that a command has set.
     Set(&'a [Camera]),
-    /// Those of a uniform buffer.
+    /// Cameras of a uniform buffer.
     Buffer { range: BufferRange, count: usize },
 }
 

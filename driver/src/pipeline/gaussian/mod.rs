@@ -36,7 +36,7 @@ pub(crate) struct GaussianPipeline {
     pub(crate) fixed: FixedFunctionState,
     /// The states that the command buffer sets of that.
     pub(crate) dynamic: Vec<vk::DynamicState>,
-    /// What their values are held against.
+    /// The limits and features that their values must keep to.
     pub(crate) dynamic_rules: DynamicRules,
     /// The viewport, unless it is dynamic.
     pub(crate) viewport: Option<Viewport>,

@@ -240,7 +240,7 @@ impl Modes {
     }
 }
 
-/// What the values of dynamic states are held against when a draw executes.
+/// Limits and features that the values of dynamic states must keep to when a draw executes.
 #[derive(Debug)]
 pub(crate) struct DynamicRules {
     modes: Modes,

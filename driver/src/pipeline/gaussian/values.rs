@@ -15,7 +15,7 @@ pub(crate) fn order(value: GaussianOrderGAURAST) -> Option<GaussianOrder> {
     }
 }
 
-/// Whether opacity makes up for the low-pass filter, if the value is one.
+/// Tells if opacity makes up for the low-pass filter; `None` if the value is no such mode.
 pub(crate) fn is_compensated(value: GaussianAntialiasingGAURAST) -> Option<bool> {
     match value {
         GaussianAntialiasingGAURAST::DILATE => Some(false),

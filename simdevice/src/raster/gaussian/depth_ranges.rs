@@ -117,7 +117,7 @@ impl DepthRanges {
         depth.simd_ge(least) & depth.simd_le(greatest)
     }
 
-    /// Which of a round's depths may pass in a block: a bit for each.
+    /// Depths of a round that may pass in a block: a bit for each.
     #[inline(always)]
     pub(super) fn shown<S: Simd>(&self, simd: S, block: usize, depths: &[u32; ROUND]) -> u32 {
         let least = S::u32s::splat(simd, self.least[block]);

@@ -26,7 +26,7 @@ pub(super) struct StagedRound {
     pub(super) looks: [SplatColor; ROUND],
 }
 
-/// What several Gaussians are placed by at a time: by element, and then by Gaussian.
+/// Numbers by which several Gaussians are placed at a time: by element, and then by Gaussian.
 #[derive(Debug, Default)]
 struct Gathered {
     mean: [[f64; ROUND]; 2],
@@ -37,7 +37,7 @@ struct Gathered {
     depth: [u32; ROUND],
 }
 
-/// What it takes to find alphas, but for `v` at the middles of blocks.
+/// Numbers that finding alphas takes, but for `v` at the middles of blocks.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C, align(64))]
 struct StagedSplat {
