@@ -2,7 +2,6 @@
 
 mod driver;
 mod gaussian;
-mod loader;
 mod shader;
 mod simulator;
 mod stress;

@@ -8,7 +8,7 @@ use gaurast::vk::{
 };
 
 use super::{Bytes, FORMATS, OBJECTS, Resource, Run, pick};
-use crate::contexts::gaussian::{attribute_locations, attributes, scene_bindings};
+use gaurast_testkit::gaussians::{attribute_locations, attributes, scene_bindings};
 
 impl Run {
     fn memory(
@@ -182,7 +182,7 @@ impl Run {
         ]);
         let multisample =
             vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(samples);
-        let blend = [crate::contexts::over()];
+        let blend = [gaurast_testkit::over()];
         let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blend);
         let dynamic = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
         let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic);

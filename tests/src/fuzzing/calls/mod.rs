@@ -6,14 +6,12 @@ mod create;
 mod record;
 mod triangles;
 
-use std::sync::PoisonError;
-
 use ash::vk;
 use gaurast::gaussian_primitive_topology;
 use gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST as GaussianFeatures;
 
 use super::bytes::Bytes;
-use crate::contexts::{Messages, messenger_info};
+use gaurast_testkit::Messages;
 
 /// Calls of a run at most.
 const CALLS: usize = 120;
@@ -105,7 +103,7 @@ impl Run {
             let messages = Box::<Messages>::default();
             let debug_utils = ash::ext::debug_utils::Instance::new(&entry, &instance);
             let messenger = debug_utils
-                .create_debug_utils_messenger(&messenger_info(&messages), None)
+                .create_debug_utils_messenger(&messages.messenger(), None)
                 .expect("a messenger");
             let physical = instance.enumerate_physical_devices().expect("devices")[0];
             let queues = [vk::DeviceQueueCreateInfo::default().queue_priorities(&[1.0])];
@@ -196,7 +194,7 @@ impl Run {
 
     /// What the driver said of the loss of the device.
     fn reason(&self) -> String {
-        let messages = self.messages.lock().unwrap_or_else(PoisonError::into_inner);
+        let messages = self.messages.take();
         let said = messages.iter().find(|it| it.id == "GAURAST-device-lost");
         said.map_or_else(|| "nothing was said".to_owned(), |it| it.text.clone())
     }

@@ -7,8 +7,10 @@ use ash::vk;
 use half::f16;
 use image::{Rgb, RgbImage};
 
-use super::PictureError;
-use crate::triangles::{Output, Picture, texel_size};
+use gaurast_oracle::compare::PictureError;
+
+use crate::output::{Output, Picture};
+use crate::resource::texel_size;
 
 /// How one picture of two devices differs.
 #[derive(Clone, Debug)]

@@ -2,11 +2,12 @@
 
 use ash::vk;
 
-use super::output::{Output, Picture, texel_size};
-use super::{
-    Bindings, Commands, Gpu, Image, ImageOptions, Pass, Pipeline, PipelineOptions, Resource,
-    Sampler, aspects,
-};
+use crate::descriptors::{Bindings, Resource};
+use crate::gpu::{Commands, Gpu};
+use crate::output::{Output, Picture};
+use crate::pass::{Attachments, Formats, Pass};
+use crate::pipeline::{Pipeline, PipelineOptions};
+use crate::resource::{Image, ImageOptions, Sampler, aspects, depth_and_stencil, texel_size};
 
 /// What a [`Target`] is like.
 #[derive(Clone, Debug)]
@@ -103,66 +104,26 @@ impl Target {
 
     /// Formats for pipelines and secondary command buffers: colours, depth and stencil.
     pub fn formats(&self) -> (&[vk::Format], vk::Format, vk::Format) {
-        let depth = self.options.depth.unwrap_or_default();
-        let has = |aspect| aspects(depth).contains(aspect);
-        let or_none = |is: bool| if is { depth } else { vk::Format::UNDEFINED };
-        (
-            &self.options.colors,
-            or_none(has(vk::ImageAspectFlags::DEPTH)),
-            or_none(has(vk::ImageAspectFlags::STENCIL)),
-        )
+        let (depth, stencil) = depth_and_stencil(self.options.depth.unwrap_or_default());
+        (&self.options.colors, depth, stencil)
     }
 
-    /// Begins a dynamic render.
-    pub(super) fn begin(&self, commands: &Commands, pass: &Pass) {
-        let layout = vk::ImageLayout::GENERAL;
-        let attachment = |view| {
-            vk::RenderingAttachmentInfo::default()
-                .image_view(view)
-                .image_layout(layout)
-                .load_op(pass.load)
-                .store_op(pass.store)
-        };
-        let mut colors: Vec<_> = (self.colors.iter())
-            .map(|image| {
-                let clear = vk::ClearValue { color: pass.color };
-                attachment(image.attachment).clear_value(clear)
-            })
-            .collect();
-        for (color, resolved) in colors.iter_mut().zip(&self.resolved) {
-            let mode = if is_integer(resolved.options.format) {
-                vk::ResolveModeFlags::SAMPLE_ZERO
-            } else {
-                vk::ResolveModeFlags::AVERAGE
-            };
-            *color = color
-                .resolve_mode(mode)
-                .resolve_image_view(resolved.attachment)
-                .resolve_image_layout(layout);
-        }
-        let depth_view = self.depth.as_ref().map(|image| image.attachment);
-        let depth = attachment(depth_view.unwrap_or_default()).clear_value(vk::ClearValue {
-            depth_stencil: pass.depth,
-        });
-        let (_, depth_format, stencil_format) = self.formats();
+    /// One colour attachment of four 32-bit floats, and nothing else.
+    pub fn floats(gpu: &Gpu, size: [u32; 2]) -> Self {
+        let floats = TargetOptions::of(vk::Format::R32G32B32A32_SFLOAT);
+        Self::new(gpu, &TargetOptions { size, ..floats })
+    }
+
+    /// The texels of the first colour attachment; `T` is a texel.
+    pub fn read<T: bytemuck::AnyBitPattern>(&self) -> Vec<T> {
+        self.colors[0].colors()
+    }
+
+    /// The area of a pass.
+    fn area(&self, pass: &Pass) -> vk::Rect2D {
         let [width, height] = self.options.size;
-        let area = pass.area.unwrap_or(vk::Rect2D {
-            offset: vk::Offset2D::default(),
-            extent: vk::Extent2D { width, height },
-        });
-        let mut info = vk::RenderingInfo::default()
-            .flags(pass.flags)
-            .render_area(area)
-            .layer_count(1)
-            .color_attachments(&colors);
-        if depth_format != vk::Format::UNDEFINED {
-            info = info.depth_attachment(&depth);
-        }
-        if stencil_format != vk::Format::UNDEFINED {
-            info = info.stencil_attachment(&depth);
-        }
-        // SAFETY: see `triangles`.
-        unsafe { commands.device().cmd_begin_rendering(commands.raw, &info) };
+        let whole = vk::Rect2D::default().extent(vk::Extent2D { width, height });
+        pass.area.unwrap_or(whole)
     }
 
     /// One pass of `draws`, then everything that the target holds.
@@ -206,6 +167,151 @@ impl Target {
             let mut picture = fetch_sample(gpu, image, sample);
             picture.name = format!("{name} sample {sample}");
             pictures.push(picture);
+        }
+    }
+}
+
+impl Attachments for Target {
+    fn size(&self) -> [u32; 2] {
+        self.options.size
+    }
+
+    fn attachment_formats(&self) -> Formats {
+        Formats {
+            colors: self.options.colors.clone(),
+            depth: self.options.depth.unwrap_or_default(),
+            samples: self.options.samples,
+        }
+    }
+
+    fn begin(&self, device: &ash::Device, commands: vk::CommandBuffer, pass: &Pass) {
+        let layout = vk::ImageLayout::GENERAL;
+        let attachment = |view| {
+            vk::RenderingAttachmentInfo::default()
+                .image_view(view)
+                .image_layout(layout)
+                .load_op(pass.load)
+                .store_op(pass.store)
+        };
+        let mut colors: Vec<_> = (self.colors.iter())
+            .map(|image| {
+                let clear = vk::ClearValue { color: pass.color };
+                attachment(image.attachment).clear_value(clear)
+            })
+            .collect();
+        for (color, resolved) in colors.iter_mut().zip(&self.resolved) {
+            let mode = if is_integer(resolved.options.format) {
+                vk::ResolveModeFlags::SAMPLE_ZERO
+            } else {
+                vk::ResolveModeFlags::AVERAGE
+            };
+            *color = color
+                .resolve_mode(mode)
+                .resolve_image_view(resolved.attachment)
+                .resolve_image_layout(layout);
+        }
+        let depth_view = self.depth.as_ref().map(|image| image.attachment);
+        let depth = attachment(depth_view.unwrap_or_default()).clear_value(vk::ClearValue {
+            depth_stencil: pass.depth,
+        });
+        let (_, depth_format, stencil_format) = self.formats();
+        let area = self.area(pass);
+        let mut info = vk::RenderingInfo::default()
+            .flags(pass.flags)
+            .render_area(area)
+            .layer_count(1)
+            .color_attachments(&colors);
+        if depth_format != vk::Format::UNDEFINED {
+            info = info.depth_attachment(&depth);
+        }
+        if stencil_format != vk::Format::UNDEFINED {
+            info = info.stencil_attachment(&depth);
+        }
+        // SAFETY: see the crate.
+        unsafe { device.cmd_begin_rendering(commands, &info) };
+    }
+}
+
+/// A render pass object with one subpass over a target's first colour attachment, and its framebuffer.
+pub struct PassObject<'a> {
+    /// The render pass.
+    pub render_pass: vk::RenderPass,
+    framebuffer: vk::Framebuffer,
+    target: &'a Target,
+}
+
+impl<'a> PassObject<'a> {
+    /// A render pass that clears `target` and keeps what is drawn.
+    pub fn new(target: &'a Target) -> Self {
+        let attachments = [vk::AttachmentDescription::default()
+            .format(target.options.colors[0])
+            .samples(vk::SampleCountFlags::TYPE_1)
+            .load_op(vk::AttachmentLoadOp::CLEAR)
+            .store_op(vk::AttachmentStoreOp::STORE)
+            .initial_layout(vk::ImageLayout::GENERAL)
+            .final_layout(vk::ImageLayout::GENERAL)];
+        let references = [vk::AttachmentReference::default().layout(vk::ImageLayout::GENERAL)];
+        let subpasses = [vk::SubpassDescription::default().color_attachments(&references)];
+        let info = vk::RenderPassCreateInfo::default()
+            .attachments(&attachments)
+            .subpasses(&subpasses);
+        let device = target.colors[0].gpu().device();
+        let [width, height] = target.options.size;
+        let views = [target.colors[0].attachment];
+        // SAFETY: see the crate.
+        unsafe {
+            let render_pass = device
+                .create_render_pass(&info, None)
+                .expect("a render pass");
+            let info = vk::FramebufferCreateInfo::default()
+                .render_pass(render_pass)
+                .attachments(&views)
+                .width(width)
+                .height(height)
+                .layers(1);
+            let framebuffer = device.create_framebuffer(&info, None);
+            Self {
+                render_pass,
+                framebuffer: framebuffer.expect("a framebuffer"),
+                target,
+            }
+        }
+    }
+}
+
+impl Attachments for PassObject<'_> {
+    fn size(&self) -> [u32; 2] {
+        self.target.size()
+    }
+
+    fn attachment_formats(&self) -> Formats {
+        self.target.attachment_formats()
+    }
+
+    fn begin(&self, device: &ash::Device, commands: vk::CommandBuffer, pass: &Pass) {
+        let clears = [vk::ClearValue { color: pass.color }];
+        let info = vk::RenderPassBeginInfo::default()
+            .render_pass(self.render_pass)
+            .framebuffer(self.framebuffer)
+            .render_area(self.target.area(pass))
+            .clear_values(&clears);
+        // SAFETY: see the crate.
+        unsafe { device.cmd_begin_render_pass(commands, &info, vk::SubpassContents::INLINE) };
+    }
+
+    fn end(&self, device: &ash::Device, commands: vk::CommandBuffer) {
+        // SAFETY: see the crate.
+        unsafe { device.cmd_end_render_pass(commands) };
+    }
+}
+
+impl Drop for PassObject<'_> {
+    fn drop(&mut self) {
+        let device = self.target.colors[0].gpu().device();
+        // SAFETY: see the crate.
+        unsafe {
+            device.destroy_framebuffer(self.framebuffer, None);
+            device.destroy_render_pass(self.render_pass, None);
         }
     }
 }

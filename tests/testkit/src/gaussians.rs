@@ -1,38 +1,40 @@
-//! Scenes in vertex buffers, and pipelines that draw them.
+//! Gaussians: scenes in vertex buffers, and pipelines that draw them.
 
 use ash::vk;
 use gaurast::vk::{
-    GaussianAttributeLocationsGAURAST, PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST,
-    PipelineGaussianStateCreateInfoGAURAST,
+    GaussianAttributeLocationsGAURAST, GaussianCameraGAURAST,
+    PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
-
+use gaurast_oracle::scenes::SceneBuffers;
 use half::f16;
 
-use super::{Buffer, Context};
-use crate::scenes::SceneBuffers;
+use crate::gpu::{Commands, Gpu};
+use crate::pass::{Attachments, Bindable, Formats};
+use crate::pipeline::{Graphics, Pipeline, opaque};
+use crate::resource::Buffer;
 
 /// Vertex buffers: positions, scales, rotations, opacities, coefficients.
 const BINDINGS: u32 = 5;
 
 /// A scene in vertex buffers.
-pub struct DeviceScene {
-    pub(super) buffers: [Buffer; BINDINGS as usize],
+pub struct GaussianScene {
+    buffers: [Buffer; BINDINGS as usize],
     /// Number of Gaussians.
     pub count: u32,
     /// Degree of the coefficients.
     pub degree: u32,
 }
 
-impl DeviceScene {
+impl GaussianScene {
     /// Copies `scene` to the device.
-    pub fn new(context: &Context, scene: &SceneBuffers) -> Self {
+    pub fn new(gpu: &Gpu, scene: &SceneBuffers) -> Self {
         Self {
             buffers: [
-                Buffer::of(context, &scene.positions),
-                Buffer::of(context, &scene.scales),
-                Buffer::of(context, &scene.rotations),
-                Buffer::of(context, &scene.opacities),
-                Buffer::of(context, &scene.sh),
+                Buffer::of(gpu, &scene.positions),
+                Buffer::of(gpu, &scene.scales),
+                Buffer::of(gpu, &scene.rotations),
+                Buffer::of(gpu, &scene.opacities),
+                Buffer::of(gpu, &scene.sh),
             ],
             count: scene.positions.len() as u32,
             degree: scene.degree,
@@ -40,7 +42,7 @@ impl DeviceScene {
     }
 
     /// Copies `scene` to the device as half floats, triples with a fourth component.
-    pub fn half(context: &Context, scene: &SceneBuffers) -> Self {
+    pub fn half(gpu: &Gpu, scene: &SceneBuffers) -> Self {
         let half = |values: &[f32]| -> Vec<u16> {
             let values = values.iter();
             values
@@ -49,80 +51,131 @@ impl DeviceScene {
         };
         let triples = |triples: &[[f32; 3]]| {
             let padded: Vec<[f32; 4]> = triples.iter().map(|&[x, y, z]| [x, y, z, 0.0]).collect();
-            Buffer::of(context, &half(padded.as_flattened()))
+            Buffer::of(gpu, &half(padded.as_flattened()))
         };
         Self {
             buffers: [
                 triples(&scene.positions),
                 triples(&scene.scales),
-                Buffer::of(context, &half(scene.rotations.as_flattened())),
-                Buffer::of(context, &half(&scene.opacities)),
+                Buffer::of(gpu, &half(scene.rotations.as_flattened())),
+                Buffer::of(gpu, &half(&scene.opacities)),
                 triples(&scene.sh),
             ],
             count: scene.positions.len() as u32,
             degree: scene.degree,
         }
     }
+
+    /// Binds what a draw of it needs.
+    ///
+    /// # Panics
+    /// If the device doesn't draw Gaussians.
+    pub fn bind(
+        &self,
+        commands: &Commands,
+        pipeline: &GaussianPipeline,
+        camera: &GaussianCameraGAURAST,
+    ) {
+        commands.bind(pipeline);
+        for (binding, buffer) in (0..).zip(&self.buffers) {
+            commands.vertex_buffer(binding, buffer, 0);
+        }
+        commands.camera(camera);
+    }
+
+    /// Draws all of it, as seen by `camera`.
+    ///
+    /// # Panics
+    /// If the device doesn't draw Gaussians.
+    pub fn draw(
+        &self,
+        commands: &Commands,
+        pipeline: &GaussianPipeline,
+        camera: &GaussianCameraGAURAST,
+    ) {
+        self.bind(commands, pipeline, camera);
+        commands.draw(0..self.count);
+    }
 }
 
-/// What a [`Pipeline`] is made of.
-#[derive(Clone, Copy)]
-pub struct PipelineOptions<'a> {
+/// Binds what a pipeline with [`GaussianOptions::instances`] needs besides.
+pub fn bind_instances(commands: &Commands, instances: &Buffer) {
+    commands.vertex_buffer(INSTANCES, instances, 0);
+}
+
+/// What a [`GaussianPipeline`] is made of.
+#[derive(Clone)]
+pub struct GaussianOptions<'a> {
     /// The Gaussian state; its degree and locations are filled in.
     pub state: PipelineGaussianStateCreateInfoGAURAST<'a>,
     /// The degree stored in the scenes that it draws.
     pub stored_degree: u32,
     /// The degree that it draws.
     pub drawn_degree: u32,
-    /// The colour attachment's format.
-    pub format: vk::Format,
-    /// The colour attachment's blend state.
-    pub blend: vk::PipelineColorBlendAttachmentState,
-    /// The render pass that it is used in, or null for dynamic rendering.
-    pub render_pass: vk::RenderPass,
     /// Whether opacity and coefficients advance by instance.
     pub looks_by_instance: bool,
     /// Whether scenes are stored as half floats.
     pub half: bool,
     /// Whether there are model matrices and factors of the opacity, and how they advance; see [`Instance`].
     pub instances: Option<vk::VertexInputRate>,
+    /// What it draws to.
+    pub formats: Formats,
+    /// The render pass that it is used in, if it is not dynamic rendering.
+    pub render_pass: Option<vk::RenderPass>,
+    /// Depth and stencil tests.
+    pub depth_stencil: vk::PipelineDepthStencilStateCreateInfo<'static>,
+    /// Which samples are written.
+    pub sample_mask: u32,
+    /// Blending of each colour attachment; those beyond are blended as the first.
+    pub blend: Vec<vk::PipelineColorBlendAttachmentState>,
+    /// A logic operation instead of blending.
+    pub logic_op: Option<vk::LogicOp>,
+    /// Dynamic states beside viewport and scissor.
+    pub dynamic: Vec<vk::DynamicState>,
 }
 
-/// A model matrix's rows and a factor of the opacity, as [`Commands::bind_instances`](super::Commands::bind_instances)
-/// takes them.
+/// A model matrix's rows and a factor of the opacity, as bindings of instances hold them.
 pub type Instance = [f32; 13];
 
 /// The binding of [`Instance`]s, and the locations of what they hold.
-pub(super) const INSTANCES: u32 = BINDINGS;
+const INSTANCES: u32 = BINDINGS;
 const MODEL_MATRIX: u32 = 24;
 const MODEL_OPACITY: u32 = 27;
 
-impl PipelineOptions<'_> {
-    /// Draws scenes of `degree` in the default state, replacing what a 32-bit float target holds.
+impl GaussianOptions<'_> {
+    /// Draws scenes of `degree` in the default state, replacing what a 32-bit float target holds, untested.
     pub fn new(degree: u32) -> Self {
         Self {
             state: PipelineGaussianStateCreateInfoGAURAST::default(),
             stored_degree: degree,
             drawn_degree: degree,
-            format: vk::Format::R32G32B32A32_SFLOAT,
-            blend: replace(),
-            render_pass: vk::RenderPass::null(),
             looks_by_instance: false,
             half: false,
             instances: None,
+            formats: Formats::of(vk::Format::R32G32B32A32_SFLOAT),
+            render_pass: None,
+            depth_stencil: vk::PipelineDepthStencilStateCreateInfo::default(),
+            sample_mask: u32::MAX,
+            blend: vec![opaque()],
+            logic_op: None,
+            dynamic: Vec::new(),
         }
     }
-}
 
-/// The attachment takes (C, 1 - T).
-pub fn replace() -> vk::PipelineColorBlendAttachmentState {
-    vk::PipelineColorBlendAttachmentState::default().color_write_mask(vk::ColorComponentFlags::RGBA)
+    /// Draws scenes of `degree` in the default state over what a target holds, untested.
+    pub fn over(degree: u32, target: &impl Attachments) -> Self {
+        Self {
+            formats: target.attachment_formats(),
+            blend: vec![over()],
+            ..Self::new(degree)
+        }
+    }
 }
 
 /// (C, 1 - T) over what the attachment holds.
 pub fn over() -> vk::PipelineColorBlendAttachmentState {
     use vk::BlendFactor as Factor;
-    replace()
+    opaque()
         .blend_enable(true)
         .src_color_blend_factor(Factor::ONE)
         .dst_color_blend_factor(Factor::ONE_MINUS_SRC_ALPHA)
@@ -130,82 +183,57 @@ pub fn over() -> vk::PipelineColorBlendAttachmentState {
         .dst_alpha_blend_factor(Factor::ONE_MINUS_SRC_ALPHA)
 }
 
-/// A pipeline that draws [`DeviceScene`]s, with dynamic viewport and scissor.
-pub struct Pipeline {
-    pub(super) raw: vk::Pipeline,
-    layout: vk::PipelineLayout,
-    context: Context,
-}
+/// A pipeline that draws [`GaussianScene`]s, with dynamic viewport and scissor.
+pub struct GaussianPipeline(Pipeline);
 
-impl Pipeline {
+impl GaussianPipeline {
     /// Creates it.
     ///
     /// # Panics
     /// If the driver refuses it.
-    pub fn new(context: &Context, options: &PipelineOptions) -> Self {
-        let bindings = bindings(options);
-        let attributes = all_attributes(options);
-        let vertex_input = vk::PipelineVertexInputStateCreateInfo::default()
-            .vertex_binding_descriptions(&bindings)
-            .vertex_attribute_descriptions(&attributes);
-        let input_assembly = vk::PipelineInputAssemblyStateCreateInfo::default()
-            .topology(PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST);
-        let viewport = vk::PipelineViewportStateCreateInfo::default()
-            .viewport_count(1)
-            .scissor_count(1);
-        let rasterization = vk::PipelineRasterizationStateCreateInfo::default().line_width(1.0);
-        let multisample = vk::PipelineMultisampleStateCreateInfo::default()
-            .rasterization_samples(vk::SampleCountFlags::TYPE_1);
-        let attachments = [options.blend];
-        let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&attachments);
-        let dynamic_states = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
-        let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic_states);
-        let formats = [options.format];
-        let mut rendering =
-            vk::PipelineRenderingCreateInfo::default().color_attachment_formats(&formats);
+    pub fn new(gpu: &Gpu, options: &GaussianOptions<'_>) -> Self {
         let mut locations = attribute_locations();
         if options.instances.is_some() {
             locations = locations
                 .first_model_matrix(MODEL_MATRIX)
                 .model_opacity(MODEL_OPACITY);
         }
-        let mut state = options
+        let state = options
             .state
             .spherical_harmonics_degree(options.drawn_degree)
             .attribute_locations(locations);
-        let mut create_info = vk::GraphicsPipelineCreateInfo::default()
-            .vertex_input_state(&vertex_input)
-            .input_assembly_state(&input_assembly)
-            .viewport_state(&viewport)
-            .rasterization_state(&rasterization)
-            .multisample_state(&multisample)
-            .color_blend_state(&blend)
-            .dynamic_state(&dynamic)
-            .render_pass(options.render_pass)
-            .push_next(&mut state);
-        if options.render_pass == vk::RenderPass::null() {
-            create_info = create_info.push_next(&mut rendering);
-        }
-        let device = context.device();
-        // SAFETY: see `contexts`.
-        unsafe {
-            let layout = device
-                .create_pipeline_layout(&vk::PipelineLayoutCreateInfo::default(), None)
-                .expect("a layout");
-            let create_infos = [create_info.layout(layout)];
-            let pipelines = device
-                .create_graphics_pipelines(vk::PipelineCache::null(), &create_infos, None)
-                .expect("a pipeline");
-            Self {
-                raw: pipelines[0],
-                layout,
-                context: context.clone(),
-            }
-        }
+        let mut blend = options.blend.clone();
+        blend.resize(options.formats.colors.len(), options.blend[0]);
+        let mut dynamic = vec![vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
+        dynamic.extend(&options.dynamic);
+        let graphics = Graphics {
+            bindings: bindings(options),
+            attributes: all_attributes(options),
+            topology: PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST,
+            sample_mask: Some(options.sample_mask),
+            depth_stencil: options.depth_stencil,
+            logic_op: options.logic_op,
+            blend,
+            dynamic,
+            multisample: vk::PipelineMultisampleStateCreateInfo::default()
+                .rasterization_samples(vk::SampleCountFlags::from_raw(options.formats.samples)),
+            formats: options.formats.colors.clone(),
+            depth_format: options.formats.depth,
+            subpass: options.render_pass.map(|pass| (pass, 0)),
+            gaussian: Some(state),
+            ..Graphics::default()
+        };
+        Self(graphics.create(gpu).expect("a pipeline"))
     }
 }
 
-fn bindings(options: &PipelineOptions) -> Vec<vk::VertexInputBindingDescription> {
+impl Bindable for GaussianPipeline {
+    fn handles(&self) -> (vk::Pipeline, vk::PipelineLayout) {
+        self.0.handles()
+    }
+}
+
+fn bindings(options: &GaussianOptions<'_>) -> Vec<vk::VertexInputBindingDescription> {
     let mut bindings = scene_bindings(options.stored_degree, options.looks_by_instance).to_vec();
     if options.half {
         let triples = (options.stored_degree + 1).pow(2);
@@ -225,7 +253,7 @@ fn bindings(options: &PipelineOptions) -> Vec<vk::VertexInputBindingDescription>
     bindings
 }
 
-fn all_attributes(options: &PipelineOptions) -> Vec<vk::VertexInputAttributeDescription> {
+fn all_attributes(options: &GaussianOptions<'_>) -> Vec<vk::VertexInputAttributeDescription> {
     let mut attributes = attributes(options.drawn_degree);
     if options.half {
         for attribute in &mut attributes {
@@ -250,7 +278,7 @@ fn all_attributes(options: &PipelineOptions) -> Vec<vk::VertexInputAttributeDesc
 }
 
 /// Where those attributes are.
-pub(crate) fn attribute_locations() -> GaussianAttributeLocationsGAURAST {
+pub fn attribute_locations() -> GaussianAttributeLocationsGAURAST {
     GaussianAttributeLocationsGAURAST::default()
         .position(0)
         .scale(1)
@@ -260,7 +288,7 @@ pub(crate) fn attribute_locations() -> GaussianAttributeLocationsGAURAST {
 }
 
 /// A scene's bindings: positions, scales, rotations, opacities, coefficients.
-pub(crate) fn scene_bindings(
+pub fn scene_bindings(
     degree: u32,
     looks_by_instance: bool,
 ) -> [vk::VertexInputBindingDescription; BINDINGS as usize] {
@@ -281,7 +309,7 @@ pub(crate) fn scene_bindings(
 }
 
 /// The attributes in those bindings, up to a degree.
-pub(crate) fn attributes(degree: u32) -> Vec<vk::VertexInputAttributeDescription> {
+pub fn attributes(degree: u32) -> Vec<vk::VertexInputAttributeDescription> {
     let attribute = |location: u32, binding, format, offset| vk::VertexInputAttributeDescription {
         location,
         binding,
@@ -297,15 +325,4 @@ pub(crate) fn attributes(degree: u32) -> Vec<vk::VertexInputAttributeDescription
     ];
     attributes.extend((0..(degree + 1).pow(2)).map(|k| attribute(4 + k, 4, triple, 12 * k)));
     attributes
-}
-
-impl Drop for Pipeline {
-    fn drop(&mut self) {
-        let device = self.context.device();
-        // SAFETY: see `contexts`.
-        unsafe {
-            device.destroy_pipeline(self.raw, None);
-            device.destroy_pipeline_layout(self.layout, None);
-        }
-    }
 }

@@ -1,44 +1,55 @@
 //! Buffers, images and samplers.
 
 use ash::vk;
-use bytemuck::Pod;
+use bytemuck::{AnyBitPattern, NoUninit};
+use simdevice::Format;
 
-use super::Gpu;
+use crate::gpu::Gpu;
 
-/// A buffer that the host can write and read.
+/// A buffer with memory of its own.
 pub struct Buffer {
     /// The buffer.
     pub raw: vk::Buffer,
     /// Bytes.
     pub size: u64,
-    memory: vk::DeviceMemory,
+    /// Its memory, which it has alone.
+    pub memory: vk::DeviceMemory,
     gpu: Gpu,
 }
 
 impl Buffer {
-    /// A buffer for any use that holds `contents`.
-    pub fn of<T: Pod>(gpu: &Gpu, contents: &[T]) -> Self {
-        let buffer = Self::new(gpu, size_of_val(contents).max(4) as u64);
-        buffer.write(bytemuck::cast_slice(contents));
+    /// A mappable buffer for any use that holds `contents`.
+    pub fn of<T: NoUninit>(gpu: &Gpu, contents: &[T]) -> Self {
+        let buffer = Self::new(gpu, size_of_val(contents) as u64);
+        buffer.write(contents);
         buffer
     }
 
-    /// A buffer of zeros for any use.
+    /// A mappable buffer of zeros for any use. Vulkan has no empty buffers: it has four bytes at least.
     pub fn new(gpu: &Gpu, size: u64) -> Self {
+        use vk::MemoryPropertyFlags as Flags;
+        let buffer = Self::within(gpu, size, Flags::HOST_VISIBLE | Flags::HOST_COHERENT);
+        buffer.write(&vec![0u8; buffer.size as usize]);
+        buffer
+    }
+
+    /// A buffer for any use in the first memory type that has `flags`; what it holds is undefined.
+    pub fn within(gpu: &Gpu, size: u64, flags: vk::MemoryPropertyFlags) -> Self {
         use vk::BufferUsageFlags as Usage;
+        let size = size.max(4);
         let usage = Usage::VERTEX_BUFFER
             | Usage::INDEX_BUFFER
             | Usage::INDIRECT_BUFFER
             | Usage::UNIFORM_BUFFER
             | Usage::STORAGE_BUFFER
             | Usage::UNIFORM_TEXEL_BUFFER
+            | Usage::STORAGE_TEXEL_BUFFER
             | Usage::TRANSFER_SRC
             | Usage::TRANSFER_DST;
         let info = vk::BufferCreateInfo::default().size(size).usage(usage);
-        let flags = vk::MemoryPropertyFlags::HOST_VISIBLE | vk::MemoryPropertyFlags::HOST_COHERENT;
         let device = gpu.device();
-        // SAFETY: see `triangles`.
-        let buffer = unsafe {
+        // SAFETY: see the crate.
+        unsafe {
             let raw = device.create_buffer(&info, None).expect("a buffer");
             let needed = device.get_buffer_memory_requirements(raw);
             let memory = allocate(gpu, needed, flags);
@@ -51,18 +62,18 @@ impl Buffer {
                 memory,
                 gpu: gpu.clone(),
             }
-        };
-        buffer.write(&vec![0; size as usize]);
-        buffer
+        }
     }
 
-    fn write(&self, bytes: &[u8]) {
+    /// Writes to the beginning of a mappable buffer.
+    pub fn write<T: NoUninit>(&self, contents: &[T]) {
+        let bytes: &[u8] = bytemuck::cast_slice(contents);
         assert!(bytes.len() as u64 <= self.size);
         // SAFETY: the mapping is at least as long as the buffer, and the device is idle.
         self.mapped(|to| unsafe { to.copy_from_nonoverlapping(bytes.as_ptr(), bytes.len()) });
     }
 
-    /// What it holds.
+    /// What a mappable buffer holds.
     pub fn read(&self) -> Vec<u8> {
         let mut bytes = vec![0; self.size as usize];
         // SAFETY: the mapping is at least as long as the buffer, and the device is idle.
@@ -72,9 +83,16 @@ impl Buffer {
         bytes
     }
 
+    /// What a mappable buffer holds, as values.
+    pub fn values<T: AnyBitPattern>(&self) -> Vec<T> {
+        let bytes = self.read();
+        let values = bytes.chunks_exact(size_of::<T>());
+        values.map(bytemuck::pod_read_unaligned).collect()
+    }
+
     fn mapped(&self, access: impl FnOnce(*mut u8)) {
         let device = self.gpu.device();
-        // SAFETY: see `triangles`; the memory is mappable and not mapped.
+        // SAFETY: see the crate; the memory is mappable and not mapped.
         unsafe {
             let start = device
                 .map_memory(self.memory, 0, vk::WHOLE_SIZE, vk::MemoryMapFlags::empty())
@@ -85,9 +103,15 @@ impl Buffer {
     }
 }
 
+impl From<&Buffer> for vk::Buffer {
+    fn from(buffer: &Buffer) -> Self {
+        buffer.raw
+    }
+}
+
 impl Drop for Buffer {
     fn drop(&mut self) {
-        // SAFETY: see `triangles`.
+        // SAFETY: see the crate.
         unsafe {
             self.gpu.device().destroy_buffer(self.raw, None);
             self.gpu.device().free_memory(self.memory, None);
@@ -103,7 +127,7 @@ fn allocate(
     let info = vk::MemoryAllocateInfo::default()
         .allocation_size(needed.size)
         .memory_type_index(gpu.memory_type(needed.memory_type_bits, flags));
-    // SAFETY: see `triangles`.
+    // SAFETY: see the crate.
     unsafe { gpu.device().allocate_memory(&info, None) }.expect("memory")
 }
 
@@ -124,6 +148,8 @@ pub struct ImageOptions {
     pub usage: vk::ImageUsageFlags,
     /// The view's type, which decides the image's.
     pub view: vk::ImageViewType,
+    /// Flags beside what the view asks for.
+    pub flags: vk::ImageCreateFlags,
 }
 
 impl ImageOptions {
@@ -137,7 +163,25 @@ impl ImageOptions {
             samples: 1,
             usage,
             view: vk::ImageViewType::TYPE_2D,
+            flags: vk::ImageCreateFlags::empty(),
         }
+    }
+
+    /// Width, height and depth of a level.
+    pub fn level_size(&self, level: u32) -> [u32; 3] {
+        self.size.map(|size| (size >> level).max(1))
+    }
+
+    /// Texels, or blocks of texels, of a level of all layers.
+    pub fn level_texels(&self, level: u32) -> usize {
+        let side = device_format(self.format).block_side();
+        let [width, height, depth] = self.level_size(level);
+        (width.div_ceil(side) * height.div_ceil(side) * depth * self.layers) as usize
+    }
+
+    /// Texels, or blocks of texels, of all levels and layers.
+    pub fn texels(&self) -> usize {
+        (0..self.levels).map(|level| self.level_texels(level)).sum()
     }
 
     fn image_type(&self) -> vk::ImageType {
@@ -148,17 +192,29 @@ impl ImageOptions {
         }
     }
 
-    fn flags(&self) -> vk::ImageCreateFlags {
+    fn all_flags(&self) -> vk::ImageCreateFlags {
         match self.view {
             vk::ImageViewType::CUBE | vk::ImageViewType::CUBE_ARRAY => {
-                vk::ImageCreateFlags::CUBE_COMPATIBLE
+                self.flags | vk::ImageCreateFlags::CUBE_COMPATIBLE
             }
-            _ => vk::ImageCreateFlags::empty(),
+            _ => self.flags,
         }
+    }
+
+    /// Reports whether images of this use have views.
+    fn has_views(&self) -> bool {
+        use vk::ImageUsageFlags as Usage;
+        self.usage.intersects(
+            Usage::SAMPLED
+                | Usage::STORAGE
+                | Usage::COLOR_ATTACHMENT
+                | Usage::DEPTH_STENCIL_ATTACHMENT
+                | Usage::INPUT_ATTACHMENT,
+        )
     }
 }
 
-/// An image in the layout `GENERAL`, with a view of all of it.
+/// An image in the layout `GENERAL`, with a view of all of it if its use has views.
 pub struct Image {
     /// The image.
     pub raw: vk::Image,
@@ -182,7 +238,7 @@ impl Image {
             usage |= Usage::TRANSFER_DST;
         }
         let info = vk::ImageCreateInfo::default()
-            .flags(options.flags())
+            .flags(options.all_flags())
             .image_type(options.image_type())
             .format(options.format)
             .extent(vk::Extent3D {
@@ -195,7 +251,7 @@ impl Image {
             .samples(vk::SampleCountFlags::from_raw(options.samples))
             .usage(usage);
         let device = gpu.device();
-        // SAFETY: see `triangles`.
+        // SAFETY: see the crate.
         unsafe {
             let raw = device.create_image(&info, None).expect("an image");
             let needed = device.get_image_memory_requirements(raw);
@@ -210,6 +266,9 @@ impl Image {
                 aspects
             };
             let view = |aspects| {
+                if !options.has_views() {
+                    return vk::ImageView::null();
+                }
                 let info = vk::ImageViewCreateInfo::default()
                     .image(raw)
                     .view_type(options.view)
@@ -225,14 +284,14 @@ impl Image {
                 memory,
                 gpu: gpu.clone(),
             };
-            gpu.run(|commands| commands.become_general(&image));
+            gpu.run(|commands| commands.become_general(raw, range(aspects)));
             image
         }
     }
 
     /// An image to sample from, with the texels of each level in turn, tightly packed, layer by
     /// layer.
-    pub fn textured<T: Pod>(gpu: &Gpu, options: &ImageOptions, levels: &[Vec<T>]) -> Self {
+    pub fn textured<T: NoUninit>(gpu: &Gpu, options: &ImageOptions, levels: &[Vec<T>]) -> Self {
         let options = ImageOptions {
             levels: levels.len() as u32,
             usage: options.usage | vk::ImageUsageFlags::SAMPLED,
@@ -255,9 +314,9 @@ impl Image {
         image
     }
 
-    /// A copy of one level.
-    pub(super) fn region(&self, aspect: vk::ImageAspectFlags, level: u32) -> vk::BufferImageCopy {
-        let [width, height, depth] = self.options.size.map(|size| (size >> level).max(1));
+    /// A copy of one level of all layers.
+    pub fn region(&self, aspect: vk::ImageAspectFlags, level: u32) -> vk::BufferImageCopy {
+        let [width, height, depth] = self.options.level_size(level);
         let layers = vk::ImageSubresourceLayers {
             aspect_mask: aspect,
             mip_level: level,
@@ -280,7 +339,63 @@ impl Image {
         let region = self.region(aspect, 0);
         self.gpu
             .run(|commands| commands.download(self, &buffer, &[region]));
-        buffer.read()
+        let mut bytes = buffer.read();
+        bytes.truncate((texels * texel) as usize);
+        bytes
+    }
+
+    /// The colours of level 0; `T` is a texel.
+    pub fn colors<T: AnyBitPattern>(&self) -> Vec<T> {
+        let bytes = self.read(vk::ImageAspectFlags::COLOR, size_of::<T>() as u32);
+        let texels = bytes.chunks_exact(size_of::<T>());
+        texels.map(bytemuck::pod_read_unaligned).collect()
+    }
+
+    /// A copy of every level of an aspect: where each lies in a buffer, and its bytes there; and the bytes of all.
+    fn staged(&self, aspect: vk::ImageAspectFlags) -> (Vec<(vk::BufferImageCopy, usize)>, u64) {
+        let plane = aspect_format(self.options.format, aspect);
+        let mut offset = 0;
+        let regions = (0..self.options.levels)
+            .map(|level| {
+                let region = self.region(aspect, level).buffer_offset(offset);
+                let bytes = self.options.level_texels(level) * plane.texel_size();
+                // Offsets are multiples of texels and of four.
+                offset = (offset + bytes as u64).next_multiple_of(48);
+                (region, bytes)
+            })
+            .collect();
+        (regions, offset)
+    }
+
+    /// Writes all texels of an aspect, levels from the largest down, in them layers, tightly packed.
+    pub fn upload(&self, aspect: vk::ImageAspectFlags, texels: &[u8]) {
+        let (levels, size) = self.staged(aspect);
+        let mut staged = vec![0; size as usize];
+        let mut rest = texels;
+        for (region, bytes) in &levels {
+            let (level, after) = rest.split_at(*bytes);
+            staged[region.buffer_offset as usize..][..level.len()].copy_from_slice(level);
+            rest = after;
+        }
+        assert!(rest.is_empty());
+        let buffer = Buffer::of(&self.gpu, &staged);
+        let regions: Vec<_> = levels.iter().map(|(region, _)| *region).collect();
+        self.gpu
+            .run(|commands| commands.upload(&buffer, self, &regions));
+    }
+
+    /// All texels of an aspect, in the order of [`Self::upload`].
+    pub fn download(&self, aspect: vk::ImageAspectFlags) -> Vec<u8> {
+        let (levels, size) = self.staged(aspect);
+        let buffer = Buffer::new(&self.gpu, size);
+        let regions: Vec<_> = levels.iter().map(|(region, _)| *region).collect();
+        self.gpu
+            .run(|commands| commands.download(self, &buffer, &regions));
+        let staged = buffer.read();
+        let levels = levels
+            .iter()
+            .flat_map(|(region, bytes)| staged[region.buffer_offset as usize..][..*bytes].to_vec());
+        levels.collect()
     }
 
     /// The device that it is on.
@@ -292,7 +407,7 @@ impl Image {
 impl Drop for Image {
     fn drop(&mut self) {
         let device = self.gpu.device();
-        // SAFETY: see `triangles`.
+        // SAFETY: see the crate.
         unsafe {
             device.destroy_image_view(self.view, None);
             device.destroy_image_view(self.attachment, None);
@@ -300,6 +415,46 @@ impl Drop for Image {
             device.free_memory(self.memory, None);
         }
     }
+}
+
+impl From<&Image> for vk::Image {
+    fn from(image: &Image) -> Self {
+        image.raw
+    }
+}
+
+/// The device's format of the same name.
+///
+/// # Panics
+/// If it has none.
+pub fn device_format(format: vk::Format) -> Format {
+    let name = format!("{format:?}").replace('_', "");
+    let found = Format::ALL.iter().copied();
+    let mut found = found.filter(|known| format!("{known:?}").eq_ignore_ascii_case(&name));
+    found.next().expect("a format that the device has")
+}
+
+/// The format of an aspect's texels in buffers.
+///
+/// # Panics
+/// If a format has no such aspect.
+pub fn aspect_format(format: vk::Format, aspect: vk::ImageAspectFlags) -> Format {
+    use simdevice::format::Aspect;
+    let aspect = match aspect {
+        vk::ImageAspectFlags::DEPTH => Aspect::Depth,
+        vk::ImageAspectFlags::STENCIL => Aspect::Stencil,
+        _ => Aspect::Color,
+    };
+    let plane = device_format(format).plane(aspect);
+    plane.expect("a format with this aspect")
+}
+
+/// Bytes of a texel of one aspect when copied to a buffer.
+///
+/// # Panics
+/// If the device has no such format.
+pub fn texel_size(format: vk::Format) -> u32 {
+    device_format(format).texel_size() as u32
 }
 
 /// The aspects of a format.
@@ -314,6 +469,21 @@ pub fn aspects(format: vk::Format) -> vk::ImageAspectFlags {
         }
         _ => Aspect::COLOR,
     }
+}
+
+/// A format as attachments of depth and of stencil have it: undefined for the aspect that it lacks.
+pub fn depth_and_stencil(format: vk::Format) -> (vk::Format, vk::Format) {
+    let of = |aspect| {
+        if aspects(format).contains(aspect) {
+            format
+        } else {
+            vk::Format::UNDEFINED
+        }
+    };
+    (
+        of(vk::ImageAspectFlags::DEPTH),
+        of(vk::ImageAspectFlags::STENCIL),
+    )
 }
 
 /// All levels and layers.
@@ -337,7 +507,7 @@ pub struct Sampler {
 impl Sampler {
     /// Creates it.
     pub fn new(gpu: &Gpu, info: &vk::SamplerCreateInfo<'_>) -> Self {
-        // SAFETY: see `triangles`.
+        // SAFETY: see the crate.
         let raw = unsafe { gpu.device().create_sampler(info, None) }.expect("a sampler");
         Self {
             raw,
@@ -348,7 +518,7 @@ impl Sampler {
 
 impl Drop for Sampler {
     fn drop(&mut self) {
-        // SAFETY: see `triangles`.
+        // SAFETY: see the crate.
         unsafe { self.gpu.device().destroy_sampler(self.raw, None) };
     }
 }

@@ -45,7 +45,7 @@ pub fn compile(stage: Stage, source: &str) -> Vec<u32> {
 }
 
 fn kept_or_compiled(stage: Stage, source: &str) -> Vec<u32> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/triangle-shaders");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target/triangle-shaders");
     let mut hasher = DefaultHasher::new();
     (stage, source).hash(&mut hasher);
     let path = folder.join(format!("{:016x}.{}", hasher.finish(), stage.suffix()));
