@@ -12,7 +12,7 @@ use gaurast_tests::kernels;
 use gaurast_tests::scenes::{Gaussian, SceneBuffers};
 use gaurast_tests::triangles::scenes;
 
-use super::{DEVICE_MEMORY, HOST_MEMORY, LOST};
+use super::results::{DEVICE_MEMORY, HOST_MEMORY, LOST};
 
 /// The compiler of the triangles' shaders.
 pub const GLSLANG: Need = Need::Program("glslangValidator");
@@ -32,7 +32,7 @@ pub enum Opened {
 pub struct Scenario {
     pub name: String,
     pub device: Opened,
-    /// The results that some runs end in, by their places in [`RESULTS`](super::RESULTS). Others may be, too.
+    /// The results that some runs end in, by their places in [`RESULTS`](super::results::RESULTS). Others may be, too.
     pub results: &'static [usize],
     pub open: Box<dyn Fn() -> Use>,
 }

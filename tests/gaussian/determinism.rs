@@ -297,7 +297,7 @@ fn empty_draws_draw_nothing() {
 }
 
 #[gaurast_runner::test]
-fn what_is_not_covered_keeps_its_colour_even_where_draws_opaque() {
+fn what_is_not_covered_keeps_its_colour_even_where_draws_replace() {
     let scene = scenes::cloud(31, 12, 0);
     let bench = Bench::new(&scene);
     let background = [0.25, 0.5, 0.75, 1.0];

@@ -21,6 +21,8 @@ pub enum Resource {
     StorageImage(vk::ImageView),
     /// The texels of a buffer.
     Texels(vk::BufferView),
+    /// The texels of a buffer that programs write to.
+    StoredTexels(vk::BufferView),
 }
 
 impl Resource {
@@ -33,6 +35,7 @@ impl Resource {
             Self::Input(_) => vk::DescriptorType::INPUT_ATTACHMENT,
             Self::StorageImage(_) => vk::DescriptorType::STORAGE_IMAGE,
             Self::Texels(_) => vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
+            Self::StoredTexels(_) => vk::DescriptorType::STORAGE_TEXEL_BUFFER,
         }
     }
 
@@ -136,7 +139,9 @@ impl Bindings {
             Resource::Input(view) | Resource::StorageImage(view) => {
                 update(write.image_info(&image(view, vk::Sampler::null())));
             }
-            Resource::Texels(view) => update(write.texel_buffer_view(&[view])),
+            Resource::Texels(view) | Resource::StoredTexels(view) => {
+                update(write.texel_buffer_view(&[view]));
+            }
         }
     }
 }

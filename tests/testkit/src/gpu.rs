@@ -2,6 +2,7 @@
 
 use std::cell::Cell;
 use std::ffi::CStr;
+use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use ash::vk;
@@ -22,6 +23,12 @@ pub struct Gpu(Arc<Shared>);
 struct Shared {
     queue: Mutex<vk::Queue>,
     opened: Opened,
+}
+
+impl fmt::Debug for Gpu {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Gpu").field(&self.name()).finish()
+    }
 }
 
 impl Gpu {
@@ -490,6 +497,7 @@ impl Commands {
 }
 
 /// A command buffer that is ready.
+#[derive(Debug)]
 pub struct Recorded {
     gpu: Gpu,
     pool: vk::CommandPool,

@@ -52,7 +52,7 @@ pub struct Graphics<'a> {
     /// Layouts of descriptor sets.
     pub set_layouts: Vec<vk::DescriptorSetLayout>,
     /// Push constants.
-    pub push: Option<vk::PushConstantRange>,
+    pub push: Vec<vk::PushConstantRange>,
     /// Whether creation is told of a layout at all.
     pub has_layout: bool,
     /// Where vertices come from.
@@ -104,7 +104,7 @@ impl Default for Graphics<'_> {
         Self {
             shaders: Vec::new(),
             set_layouts: Vec::new(),
-            push: None,
+            push: Vec::new(),
             has_layout: true,
             bindings: Vec::new(),
             divisors: Vec::new(),
@@ -156,7 +156,7 @@ impl Graphics<'_> {
     /// # Panics
     /// If a shader module is refused, or the driver gives a pipeline that it refused.
     pub fn create(&self, gpu: &Gpu) -> Result<Pipeline, vk::Result> {
-        let layout = create_layout(gpu, &self.set_layouts, self.push.as_slice());
+        let layout = create_layout(gpu, &self.set_layouts, &self.push);
         let mut pipeline = Pipeline {
             raw: vk::Pipeline::null(),
             layout,
@@ -433,6 +433,7 @@ pub fn blend(
 }
 
 /// A graphics pipeline.
+#[derive(Debug)]
 pub struct Pipeline {
     /// The pipeline.
     pub raw: vk::Pipeline,
@@ -466,7 +467,7 @@ impl Pipeline {
         let graphics = Graphics {
             shaders,
             set_layouts: options.bindings.iter().map(|set| set.layout).collect(),
-            push: Some(push),
+            push: vec![push],
             bindings: options.vertex_bindings.clone(),
             attributes: options.vertex_attributes.clone(),
             topology: options.topology,
@@ -508,6 +509,7 @@ impl Drop for Pipeline {
 }
 
 /// A compute pipeline.
+#[derive(Debug)]
 pub struct Kernel {
     /// The pipeline.
     pub raw: vk::Pipeline,

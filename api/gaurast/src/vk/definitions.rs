@@ -732,7 +732,7 @@ impl GaussianCameraDataGAURAST {
 }
 
 /// The type of `vkCmdSetGaussianCameraGAURAST`.
-#[allow(non_camel_case_types)]
+#[allow(non_camel_case_types, reason = "the name is Vulkan's")]
 pub type PFN_vkCmdSetGaussianCameraGAURAST = unsafe extern "system" fn(
     command_buffer: vk::CommandBuffer,
     p_camera: *const GaussianCameraGAURAST<'_>,

@@ -1,6 +1,6 @@
 //! What is drawn again as it was is not projected again, and whatever changes is seen.
 
-use super::drawing::draw_as_without_skips;
+use super::drawing::{draw_as_without_skips, programs};
 use crate::common::{OVER, attachment, gaussians_in, image, rendering, single};
 use simdevice::format::ClearValue;
 use simdevice::packet::{

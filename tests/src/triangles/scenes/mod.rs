@@ -1,12 +1,13 @@
 //! Scenes that sweep the state of triangle pipelines, each named after what it shows.
 
-use super::{Gpu, Output};
+use gaurast_testkit::Gpu;
 
 mod blending;
 mod commands;
 mod depth_stencil;
 mod models;
 mod multisample;
+mod outcome;
 mod passes;
 mod raster;
 mod resources;
@@ -14,6 +15,8 @@ mod shading;
 mod simple;
 mod texture;
 mod topology;
+
+pub use outcome::{Drawn, Missing};
 
 /// A scene: one function that draws it on any device.
 #[derive(Clone, Copy, Debug)]
@@ -23,14 +26,6 @@ pub struct Scene {
     /// Draws it.
     pub draw: fn(&Gpu) -> Drawn,
 }
-
-/// What a scene leaves behind, unless the device lacks an optional feature that it needs.
-pub type Drawn = Result<Output, Missing>;
-
-/// An optional feature that a device does not have.
-#[derive(Clone, Debug, thiserror::Error)]
-#[error("the device does not have {0}")]
-pub struct Missing(pub String);
 
 /// The scene of a name.
 pub fn find(name: &str) -> Option<&'static Scene> {
