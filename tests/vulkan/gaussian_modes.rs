@@ -249,4 +249,5 @@ fn the_camera_may_come_from_a_uniform_buffer() {
         let messages = scene.gpu.message_texts().concat();
         assert!(messages.contains(word), "{messages:?}");
     }
+    camera_set.destroy(&scene.gpu);
 }
