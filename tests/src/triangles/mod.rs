@@ -8,6 +8,7 @@ pub mod checksum;
 pub mod edges;
 mod expected;
 pub mod models;
+mod outcome;
 pub mod scenes;
 pub mod shapes;
 pub mod workloads;
@@ -20,4 +21,5 @@ pub use gaurast_testkit::{
     Pass, Picture, Pipeline, PipelineOptions, Recorded, Resource, Sampler, VERTEX, Vertex,
     accurate_lavapipe, aspects, attribute, binding, blend, depth_test, opaque, range, texel_size,
 };
-pub use scenes::{Drawn, Missing, Scene};
+pub use outcome::{Drawn, Missing};
+pub use scenes::Scene;

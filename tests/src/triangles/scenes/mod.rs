@@ -7,7 +7,6 @@ mod commands;
 mod depth_stencil;
 mod models;
 mod multisample;
-mod outcome;
 mod passes;
 mod raster;
 mod resources;
@@ -16,7 +15,7 @@ mod simple;
 mod texture;
 mod topology;
 
-pub use outcome::{Drawn, Missing};
+pub use super::outcome::{Drawn, Missing};
 
 /// A scene: one function that draws it on any device.
 #[derive(Clone, Copy, Debug)]
