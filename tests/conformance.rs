@@ -2,14 +2,13 @@
 
 mod driver;
 mod gaussian;
-mod loader;
+mod needs;
 mod shader;
 mod simulator;
 mod stress;
 mod triangles;
 
-/// The compiler of the shaders that are written in GLSL.
-const GLSLANG: gaurast_runner::Need = gaurast_runner::Need::Program("glslangValidator");
+pub use needs::GLSLANG;
 
 fn main() -> std::process::ExitCode {
     // SAFETY: no other thread runs yet.

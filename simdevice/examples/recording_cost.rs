@@ -3,10 +3,18 @@
 //! `valgrind --tool=callgrind --callgrind-out-file=/dev/null`. The difference of two counts of times is the draws' alone.
 
 #[path = "../tests/common/mod.rs"]
-#[allow(dead_code, missing_docs)]
+#[allow(
+    dead_code,
+    missing_docs,
+    reason = "the tests use all of it and document none"
+)]
 mod common;
 #[path = "../tests/common/scenes.rs"]
-#[allow(dead_code, missing_docs)]
+#[allow(
+    dead_code,
+    missing_docs,
+    reason = "the tests use all of it and document none"
+)]
 mod scenes;
 
 use simdevice::runtime::SimdLevel;

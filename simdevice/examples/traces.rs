@@ -3,10 +3,14 @@
 //! given or the current one.
 
 #[path = "../tests/common/mod.rs"]
-#[allow(dead_code, missing_docs)]
+#[allow(
+    dead_code,
+    missing_docs,
+    reason = "the tests use all of it and document none"
+)]
 mod common;
 #[path = "../tests/common/scenes.rs"]
-#[allow(missing_docs)]
+#[allow(missing_docs, reason = "the tests document none of it")]
 mod scenes;
 
 use std::path::PathBuf;

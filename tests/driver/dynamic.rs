@@ -2,7 +2,7 @@
 //! that have the state, or draws that are recorded one by one.
 
 use ash::vk;
-use gaurast_tests::triangles::{
+use gaurast_testkit::{
     Buffer, Commands, Gpu, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex,
 };
 use vk::DynamicState as S;
@@ -157,7 +157,7 @@ fn blend(on: bool) -> vk::PipelineColorBlendAttachmentState {
     } else {
         vk::BlendFactor::ZERO
     };
-    gaurast_tests::triangles::blend(vk::BlendFactor::SRC_ALPHA, to, vk::BlendOp::ADD)
+    gaurast_testkit::blend(vk::BlendFactor::SRC_ALPHA, to, vk::BlendOp::ADD)
 }
 
 fn mask(on: bool) -> vk::ColorComponentFlags {

@@ -4,20 +4,15 @@
 
 use std::ffi::CStr;
 
-use ash::vk::{self, TaggedStructure};
-use gaurast::vk::{
-    GaussianCameraGAURAST, PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST,
-    PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST,
-    PipelineGaussianApproximationStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
-};
+use ash::vk;
+use gaurast::vk::GaussianCameraGAURAST;
 use gaurast_runner::{Case, Need};
-use gaurast_tests::contexts::{
-    Buffer, Context, DeviceScene, Message, Pass, PassObject, Pipeline, PipelineOptions, Settings,
-    Target, over,
+use gaurast_testkit::loader::through_the_loader;
+use gaurast_testkit::{
+    Buffer, Driver, GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Message, Opening, Pass,
+    PassObject, Settings, Target, over,
 };
 use gaurast_tests::scenes;
-
-use crate::loader::manifest;
 
 const VALIDATION: &CStr = c"VK_LAYER_KHRONOS_validation";
 
@@ -56,45 +51,6 @@ const EXPECTED: &[[&str; 3]] = &[
     ],
 ];
 
-/// Structures' types and sizes, as the validation layer wants to be told of those that it does not
-/// know.
-fn unregistered_structures() -> String {
-    use PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST as Features;
-    use PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST as Properties;
-    use PipelineGaussianApproximationStateCreateInfoGAURAST as Approximation;
-    use PipelineGaussianStateCreateInfoGAURAST as State;
-    let separator = if cfg!(windows) { ";" } else { ":" };
-    [
-        (Features::STRUCTURE_TYPE, size_of::<Features<'_>>()),
-        (Properties::STRUCTURE_TYPE, size_of::<Properties<'_>>()),
-        (State::STRUCTURE_TYPE, size_of::<State<'_>>()),
-        (
-            Approximation::STRUCTURE_TYPE,
-            size_of::<Approximation<'_>>(),
-        ),
-    ]
-    .map(|(structure, size)| format!("{}{separator}{size}", structure.as_raw()))
-    .join(separator)
-}
-
-/// Runs `inside` in a process where the loader finds this driver alone.
-fn through_the_loader(case: &Case, inside: impl FnOnce(ash::Entry)) {
-    if case.is_alone() {
-        // SAFETY: the loader is the system's own.
-        let entry = unsafe { ash::Entry::load() };
-        return inside(entry.expect("the loader"));
-    }
-    let folder = tempfile::tempdir().expect("a folder");
-    let manifest = manifest(folder.path());
-    case.run_alone(|command| {
-        command
-            .env("VK_DRIVER_FILES", &manifest)
-            .env("VK_ICD_FILENAMES", &manifest)
-            .env("VK_LAYER_CUSTOM_STYPE_LIST", unregistered_structures())
-            .env_remove("VK_INSTANCE_LAYERS");
-    });
-}
-
 const SIZE: [u32; 2] = [203, 139];
 
 fn camera() -> GaussianCameraGAURAST<'static> {
@@ -102,41 +58,43 @@ fn camera() -> GaussianCameraGAURAST<'static> {
 }
 
 /// A picture that takes dynamic rendering, a render pass, indices and blending to draw.
-fn picture(context: &Context) -> Vec<[f32; 4]> {
+fn picture(gpu: &Gpu) -> Vec<[f32; 4]> {
     let scene = scenes::cloud(31, 2000, 3);
-    let on_device = DeviceScene::new(context, &scene);
+    let on_device = GaussianScene::new(gpu, &scene);
     let indices: Vec<u32> = (0..on_device.count).rev().step_by(3).collect();
-    let index_buffer = Buffer::of(context, &indices);
-    let options = PipelineOptions {
-        blend: over(),
-        ..PipelineOptions::new(scene.degree)
+    let index_buffer = Buffer::of(gpu, &indices);
+    let options = GaussianOptions {
+        blend: vec![over()],
+        ..GaussianOptions::new(scene.degree)
     };
-    let target = Target::new(context, options.format, SIZE);
-    let object = PassObject::new(context, &target);
-    let pipeline = Pipeline::new(context, &options);
-    let pipeline_of_object = Pipeline::new(
-        context,
-        &PipelineOptions {
-            render_pass: object.render_pass,
+    let target = Target::floats(gpu, SIZE);
+    let object = PassObject::new(&target);
+    let pipeline = GaussianPipeline::new(gpu, &options);
+    let pipeline_of_object = GaussianPipeline::new(
+        gpu,
+        &GaussianOptions {
+            render_pass: Some(object.render_pass),
             ..options
         },
     );
-    context.run(|commands| {
+    gpu.run(|commands| {
         let background = [0.1, 0.2, 0.3, 1.0];
         commands.pass(&target, &Pass::clear(background), || ());
         let pass = Pass {
-            area: Some(vk::Rect2D::default().extent(target.extent)),
-            object: Some(&object),
+            area: Some(vk::Rect2D::default().extent(vk::Extent2D {
+                width: SIZE[0],
+                height: SIZE[1],
+            })),
             ..Pass::clear(background)
         };
-        commands.pass(&target, &pass, || {
-            commands.bind(&pipeline_of_object, &on_device, &camera());
-            commands.draw([500, 1, 1000, 0]);
+        commands.pass(&object, &pass, || {
+            on_device.bind(commands, &pipeline_of_object, &camera());
+            commands.draw(1000..1000 + 500);
         });
-        commands.pass(&target, &Pass::default(), || {
-            commands.bind(&pipeline, &on_device, &camera());
-            commands.bind_indices(&index_buffer);
-            commands.draw_indexed(indices.len() as u32, 0, 0);
+        commands.pass(&target, &Pass::load(), || {
+            on_device.bind(commands, &pipeline, &camera());
+            commands.indices(&index_buffer, 0, vk::IndexType::UINT32);
+            commands.draw_indexed(0..indices.len() as u32, 0);
         });
     });
     target.read()
@@ -144,25 +102,29 @@ fn picture(context: &Context) -> Vec<[f32; 4]> {
 
 /// The picture that the driver draws which is linked into the test.
 fn embedded_picture() -> Vec<[f32; 4]> {
-    picture(&Context::embedded(&Settings::default()))
+    picture(&Gpu::embedded(&Settings::default()).expect("a device"))
 }
 
 #[gaurast_runner::test(needs = [Need::VulkanLoader])]
 fn the_picture_is_that_of_the_embedded_door(case: &Case) {
-    through_the_loader(case, |entry| {
-        let context = Context::new(entry, &[]);
-        let loaded = picture(&context);
-        assert_eq!(context.messages(), []);
+    through_the_loader(case, || {
+        let gpu = Gpu::loaded().expect("this driver's device");
+        let loaded = picture(&gpu);
+        assert_eq!(gpu.messages(), []);
         assert!(loaded == embedded_picture());
     });
 }
 
 #[gaurast_runner::test(needs = [Need::ValidationLayer])]
 fn the_validation_layer_says_what_is_expected(case: &Case) {
-    through_the_loader(case, |entry| {
-        let context = Context::new(entry, &[VALIDATION]);
-        let validated = picture(&context);
-        let messages = context.messages();
+    through_the_loader(case, || {
+        let gpu = Gpu::open(&Opening {
+            layers: &[VALIDATION],
+            ..Opening::of(Driver::Loaded)
+        });
+        let gpu = gpu.expect("this driver's device");
+        let validated = picture(&gpu);
+        let messages = gpu.messages();
         // Layers of some versions say less.
         let unexpected: Vec<_> = messages
             .iter()

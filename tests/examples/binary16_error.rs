@@ -5,8 +5,8 @@
 
 use gaurast::vk::{GaussianPrecisionGAURAST, PipelineGaussianStateCreateInfoGAURAST};
 use gaurast_scene::camera::DEFAULT_FOV;
-use gaurast_tests::contexts::{
-    Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target,
+use gaurast_testkit::{
+    GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Settings, Target,
 };
 use gaurast_tests::oracle::{OracleCamera, OracleState, render_bounded};
 use gaurast_tests::scenes::{self, SceneBuffers};
@@ -83,25 +83,25 @@ fn main() -> Result<(), Box<dyn Error>> {
         "| scene | precision | greatest error | mean error | PSNR, dB | pixels off by 1/255 or more |"
     );
     println!("|---|---|---:|---:|---:|---:|");
-    let context = Context::embedded(&Settings::default());
+    let gpu = Gpu::embedded(&Settings::default()).expect("a device");
     for (name, scene, camera) in &subjects {
-        let on_device = DeviceScene::new(&context, scene);
+        let on_device = GaussianScene::new(&gpu, scene);
         let view = OracleCamera::new(camera, SIZE).ok_or("a camera that the oracle lacks")?;
         let reference = render_bounded(&scene.as_oracle(), &view, &OracleState::default());
         for (precision_name, precision) in [
             ("binary16", GaussianPrecisionGAURAST::FLOAT16),
             ("binary32", GaussianPrecisionGAURAST::FLOAT32),
         ] {
-            let options = PipelineOptions {
+            let options = GaussianOptions {
                 state: PipelineGaussianStateCreateInfoGAURAST::default().precision(precision),
-                ..PipelineOptions::new(scene.degree)
+                ..GaussianOptions::new(scene.degree)
             };
-            let pipeline = Pipeline::new(&context, &options);
-            let target = Target::new(&context, options.format, SIZE);
-            context.run(|commands| {
+            let pipeline = GaussianPipeline::new(&gpu, &options);
+            let target = Target::floats(&gpu, SIZE);
+            gpu.run(|commands| {
                 commands.pass(&target, &Pass::clear([0.0; 4]), || {
-                    commands.bind(&pipeline, &on_device, camera);
-                    commands.draw([on_device.count, 1, 0, 0]);
+                    on_device.bind(commands, &pipeline, camera);
+                    commands.draw(0..on_device.count);
                 });
             });
             let Figures {

@@ -9,11 +9,11 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use gaurast::vk::{GaussianCameraGAURAST, PipelineGaussianStateCreateInfoGAURAST};
-use gaurast_tests::compare::{Limits, verdict};
-use gaurast_tests::contexts::{
-    Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target,
+use gaurast_testkit::for_levels::levels;
+use gaurast_testkit::{
+    GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Settings, Target,
 };
-use gaurast_tests::for_levels::levels;
+use gaurast_tests::compare::{Limits, verdict};
 use gaurast_tests::oracle::{OracleCamera, OracleState, render_bounded};
 use gaurast_tests::scenes::{Gaussian, SceneBuffers};
 use plotters::prelude::*;
@@ -180,23 +180,23 @@ fn sweeps() -> Vec<Sweep> {
 }
 
 /// The greatest distance from the envelope at each level.
-fn errors(contexts: &[Context], view: &View) -> Vec<f64> {
+fn errors(gpus: &[Gpu], view: &View) -> Vec<f64> {
     let scene = SceneBuffers::new(0, view.gaussians.iter().cloned());
     let camera = OracleCamera::new(&view.camera, SIZE).expect("a camera that the oracle has");
     let state = OracleState::from(&view.state);
     let reference = render_bounded(&scene.as_oracle(), &camera, &state);
-    let of = |context: &Context| {
-        let options = PipelineOptions {
+    let of = |gpu: &Gpu| {
+        let options = GaussianOptions {
             state: view.state,
-            ..PipelineOptions::new(0)
+            ..GaussianOptions::new(0)
         };
-        let pipeline = Pipeline::new(context, &options);
-        let on_device = DeviceScene::new(context, &scene);
-        let target = Target::new(context, options.format, SIZE);
-        context.run(|commands| {
+        let pipeline = GaussianPipeline::new(gpu, &options);
+        let on_device = GaussianScene::new(gpu, &scene);
+        let target = Target::floats(gpu, SIZE);
+        gpu.run(|commands| {
             commands.pass(&target, &Pass::clear([0.0; 4]), || {
-                commands.bind(&pipeline, &on_device, &view.camera);
-                commands.draw([on_device.count, 1, 0, 0]);
+                on_device.bind(commands, &pipeline, &view.camera);
+                commands.draw(0..on_device.count);
             });
         });
         verdict(
@@ -206,7 +206,7 @@ fn errors(contexts: &[Context], view: &View) -> Vec<f64> {
         )
         .max_distance
     };
-    contexts.iter().map(of).collect()
+    gpus.iter().map(of).collect()
 }
 
 /// A sweep's points: the value and the error at each level.
@@ -251,12 +251,13 @@ fn main() -> Result<(), Box<dyn Error>> {
         .map_or_else(PathBuf::new, PathBuf::from);
     let all = levels();
     let levels = [all[0], all[all.len() - 1]];
-    let contexts = levels.map(|simd| {
-        Context::embedded(&Settings {
+    let gpus = levels.map(|simd| {
+        Gpu::embedded(&Settings {
             simd: Some(simd),
             threads: None,
             ..Settings::default()
         })
+        .expect("a device")
     });
     let mut csv = format!("sweep,value,{}\n", levels.join(","));
     let mut results = Vec::new();
@@ -267,7 +268,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             let mut worst = vec![0.0f64; levels.len()];
             for seed in 0..SEEDS {
                 let mut rng = ChaCha8Rng::seed_from_u64(seed);
-                let found = errors(&contexts, &(sweep.view)(&mut rng, value));
+                let found = errors(&gpus, &(sweep.view)(&mut rng, value));
                 worst
                     .iter_mut()
                     .zip(found)

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 /// Runs of each kernel that are timed.
 const RUNS: usize = 7;
 
-fn time(prepared: &Prepared<'_>) -> Result<Duration, Box<dyn Error>> {
+fn time(prepared: &Prepared) -> Result<Duration, Box<dyn Error>> {
     let started = Instant::now();
     prepared.run()?;
     Ok(started.elapsed())

@@ -3,8 +3,8 @@
 //! held at most.
 
 use gaurast::vk::GaussianCameraGAURAST;
-use gaurast_tests::contexts::{
-    Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target,
+use gaurast_testkit::{
+    GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Settings, Target,
 };
 use gaurast_tests::scenes::{Gaussian, SceneBuffers};
 use std::error::Error;
@@ -22,19 +22,19 @@ fn main() -> Result<(), Box<dyn Error>> {
         sh: vec![[0, 1, 2].map(|c| (index * (3 + c) % 7) as f32 / 2.0 - 1.5)],
     };
     let scene = SceneBuffers::new(0, (0..count).map(one));
-    let context = Context::embedded(&Settings::default());
-    let options = PipelineOptions::new(0);
-    let pipeline = Pipeline::new(&context, &options);
-    let on_device = DeviceScene::new(&context, &scene);
-    let target = Target::new(&context, options.format, [side; 2]);
+    let gpu = Gpu::embedded(&Settings::default()).expect("a device");
+    let options = GaussianOptions::new(0);
+    let pipeline = GaussianPipeline::new(&gpu, &options);
+    let on_device = GaussianScene::new(&gpu, &scene);
+    let target = Target::floats(&gpu, [side; 2]);
     let camera = GaussianCameraGAURAST::default()
         .focal_length([side as f32; 2])
         .principal_point([0.5 * side as f32; 2]);
     let started = Instant::now();
-    context.run(|commands| {
+    gpu.run(|commands| {
         commands.pass(&target, &Pass::clear([0.0; 4]), || {
-            commands.bind(&pipeline, &on_device, &camera);
-            commands.draw([on_device.count, 1, 0, 0]);
+            on_device.bind(commands, &pipeline, &camera);
+            commands.draw(0..on_device.count);
         });
     });
     println!(

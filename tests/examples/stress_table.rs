@@ -8,8 +8,8 @@ use std::path::PathBuf;
 use gaurast_bench::quads::QuadRenderer;
 use gaurast_scene::camera::{Camera, DEFAULT_NEAR, Model};
 use gaurast_scene::{GaussianShape, Scene};
-use gaurast_tests::contexts::{Context, Settings};
-use gaurast_tests::for_levels::levels;
+use gaurast_testkit::for_levels::levels;
+use gaurast_testkit::{Gpu, Settings};
 use gaurast_tests::oracle::{
     OracleCamera, OracleState, Reference, render_binary16, render_bounded,
 };
@@ -138,13 +138,14 @@ fn main() -> Result<(), Box<dyn Error>> {
         PathBuf::from,
     );
     let levels = levels();
-    let context = |simd: &&'static str| {
-        Context::embedded(&Settings {
+    let gpu = |simd: &&'static str| {
+        Gpu::embedded(&Settings {
             simd: Some(simd),
             ..Settings::default()
         })
+        .expect("a device")
     };
-    let contexts: Vec<_> = levels.iter().map(context).collect();
+    let gpus: Vec<_> = levels.iter().map(gpu).collect();
     let mut peer = QuadRenderer::through_the_loader(PEER, 0)?;
     let missing = if levels.contains(&"avx512") {
         ""
@@ -159,12 +160,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         let camera = OracleCamera::new(&stress.camera, stress.size).ok_or("the oracle's camera")?;
         let state = OracleState::from(&stress.state);
         let reference = render_bounded(&stress.scene.as_oracle(), &camera, &state);
-        let device: Vec<_> = contexts
+        let device: Vec<_> = gpus
             .iter()
-            .map(|context| Distances::new(&draw(context, &stress), &reference))
+            .map(|gpu| Distances::new(&draw(gpu, &stress), &reference))
             .collect();
         let half = draw(
-            contexts.last().ok_or("no SIMD level")?,
+            gpus.last().ok_or("no SIMD level")?,
             &stress.clone().in_binary16(),
         );
         let defined = render_binary16(&stress.scene.as_oracle(), &camera, &state);

@@ -14,7 +14,7 @@ use std::error::Error;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-use gaurast_tests::contexts::Settings;
+use gaurast_testkit::Settings;
 use gaurast_tests::triangles::Gpu;
 use gaurast_tests::triangles::workloads::{NAMES, Workload};
 

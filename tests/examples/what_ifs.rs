@@ -1,7 +1,7 @@
 //! Prints what each of the device's skips would bring as hardware (`simdevice/timing/studies/WHAT_IF.md`). `what_ifs FOLDER` writes
 //! pictures of the scenes, too.
 
-use gaurast_tests::compare::for_people;
+use gaurast_testkit::for_people;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (text, scenes) = gaurast_tests::what_ifs::markdown();

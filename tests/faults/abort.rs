@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, AtomicI64, Ordering::Relaxed};
 
 use ash::vk;
 use gaurast_runner::{Case, Variant};
-use gaurast_tests::contexts::{Context, Settings};
+use gaurast_testkit::Settings;
 use gaurast_tests::triangles::{
     Buffer, Gpu, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex, depth_test,
 };
@@ -123,7 +123,7 @@ fn fail_one(scenario: &str, n: i64) {
     }));
     match scenario {
         "gaussians" => {
-            let context = Context::embedded(&settings);
+            let context = Gpu::embedded(&settings).expect("a device");
             scenarios::draw(&context, &scenarios::scene(60_000), [640, 480], arm);
         }
         _ => {

@@ -3,6 +3,7 @@
 //! unless the device is lost, it draws the same picture afterwards.
 
 mod abort;
+mod results;
 mod scenarios;
 
 use std::collections::BTreeSet;
@@ -11,21 +12,12 @@ use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use gaurast_runner::Case;
+use results::{LOST, RESULTS};
 use scenarios::{Opened, Scenario, Use};
 use simdevice::host::injection;
 
 /// Panics since the last look: their messages, in whatever thread.
 static PANICS: Mutex<Vec<String>> = Mutex::new(Vec::new());
-
-/// What a call's failure is called, where an application expected success.
-const RESULTS: [&str; 3] = [
-    "ERROR_OUT_OF_HOST_MEMORY",
-    "ERROR_OUT_OF_DEVICE_MEMORY",
-    "ERROR_DEVICE_LOST",
-];
-const HOST_MEMORY: usize = 0;
-const DEVICE_MEMORY: usize = 1;
-const LOST: usize = 2;
 
 /// Allocations of a scenario that are failed one by one; beyond them ever fewer.
 const EACH: u64 = 40;

@@ -5,14 +5,14 @@ use gaurast::vk::{
     GaussianOrderGAURAST, GaussianPrecisionGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 use gaurast_runner::{Need, Variant};
-use gaurast_tests::contexts::{
-    Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target,
+use gaurast_testkit::{
+    GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Settings, Target,
 };
 use gaurast_tests::kernels;
 use gaurast_tests::scenes::{Gaussian, SceneBuffers};
-use gaurast_tests::triangles::{Gpu, scenes};
+use gaurast_tests::triangles::scenes;
 
-use super::{DEVICE_MEMORY, HOST_MEMORY, LOST};
+use super::results::{DEVICE_MEMORY, HOST_MEMORY, LOST};
 
 /// The compiler of the triangles' shaders.
 pub const GLSLANG: Need = Need::Program("glslangValidator");
@@ -32,7 +32,7 @@ pub enum Opened {
 pub struct Scenario {
     pub name: String,
     pub device: Opened,
-    /// The results that some runs end in, by their places in [`RESULTS`](super::RESULTS). Others may be, too.
+    /// The results that some runs end in, by their places in [`RESULTS`](super::results::RESULTS). Others may be, too.
     pub results: &'static [usize],
     pub open: Box<dyn Fn() -> Use>,
 }
@@ -64,7 +64,12 @@ const TRIANGLES: [&str; 14] = [
 /// All of them.
 pub fn all() -> Vec<Scenario> {
     let opening = scenario("opening a device", || {
-        Box::new(|| gaussians_on(&Context::embedded(&SETTINGS), Gaussians::default()))
+        Box::new(|| {
+            gaussians_on(
+                &Gpu::embedded(&SETTINGS).expect("a device"),
+                Gaussians::default(),
+            )
+        })
     });
     let mut all = vec![Scenario {
         device: Opened::Within,
@@ -72,7 +77,7 @@ pub fn all() -> Vec<Scenario> {
     }];
     for gaussians in Gaussians::all() {
         all.push(scenario(gaussians.name, move || {
-            let context = Context::embedded(&SETTINGS);
+            let context = Gpu::embedded(&SETTINGS).expect("a device");
             Box::new(move || gaussians_on(&context, gaussians))
         }));
     }
@@ -181,7 +186,7 @@ pub fn scene(count: usize) -> SceneBuffers {
 
 /// Draws a scene three times, so that it is put into chunks on the way. `drawing` is told when it begins and ends.
 pub fn draw(
-    context: &Context,
+    context: &Gpu,
     buffers: &SceneBuffers,
     size: [u32; 2],
     drawing: impl Fn(bool),
@@ -190,19 +195,19 @@ pub fn draw(
 }
 
 fn draw_as(
-    context: &Context,
+    context: &Gpu,
     buffers: &SceneBuffers,
     size: [u32; 2],
     how: Gaussians,
     drawing: impl Fn(bool),
 ) -> Vec<u8> {
-    let options = PipelineOptions {
+    let options = GaussianOptions {
         state: how.state,
-        ..PipelineOptions::new(0)
+        ..GaussianOptions::new(0)
     };
-    let pipeline = Pipeline::new(context, &options);
-    let scene = DeviceScene::new(context, buffers);
-    let target = Target::new(context, options.format, size);
+    let pipeline = GaussianPipeline::new(context, &options);
+    let scene = GaussianScene::new(context, buffers);
+    let target = Target::floats(context, size);
     let focal_length = match how.model {
         // Pixels in a radian; the picture is the whole way round.
         GaussianCameraModelGAURAST::EQUIRECTANGULAR => size[0] as f32 / std::f32::consts::TAU,
@@ -216,8 +221,8 @@ fn draw_as(
     for _ in 0..3 {
         context.run(|commands| {
             commands.pass(&target, &Pass::clear([0.0; 4]), || {
-                commands.bind(&pipeline, &scene, &camera);
-                commands.draw([scene.count, 1, 0, 0]);
+                scene.bind(commands, &pipeline, &camera);
+                commands.draw(0..scene.count);
             });
         });
     }
@@ -226,7 +231,7 @@ fn draw_as(
     bytemuck::cast_slice(&pixels).to_vec()
 }
 
-fn gaussians_on(context: &Context, how: Gaussians) -> Vec<u8> {
+fn gaussians_on(context: &Gpu, how: Gaussians) -> Vec<u8> {
     draw_as(context, &scene(1500), [96, 80], how, |_| ())
 }
 
@@ -243,7 +248,7 @@ fn kernels_on(context: &kernels::Context) -> Vec<u8> {
         let prepared = context.prepare(&kernel).expect("it is prepared");
         prepared.run().expect("it runs");
         for expected in &kernel.expected {
-            let read = prepared.read(expected.binding).expect("it is read");
+            let read = prepared.read(expected.binding);
             made.extend(bytemuck::cast_slice(&read));
         }
     }

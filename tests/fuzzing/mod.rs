@@ -5,10 +5,10 @@
 //! `GAURAST_FUZZ_RUNS=1 GAURAST_FUZZ_FIRST=n`. Panics are the process's, and runs are shared by several processes.
 
 mod shader_modules;
+mod watch;
 
 use std::ops::Range;
 use std::path::Path;
-use std::sync::{Mutex, PoisonError};
 
 use gaurast_runner::{Case, shards};
 use gaurast_tests::fuzzing::packets::Player;
@@ -16,39 +16,7 @@ use gaurast_tests::fuzzing::{calls, loaders, mutate_bytes};
 use rand::seq::IndexedRandom;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-
-/// What panicked, in whatever thread: the driver catches panics, so that an application never sees them.
-static PANICS: Mutex<Vec<String>> = Mutex::new(Vec::new());
-
-/// Keeps all panics of this process from now on, and prints them with where they come from.
-fn watch_panics() {
-    std::panic::set_hook(Box::new(|info| {
-        eprintln!("{info}\n{}", std::backtrace::Backtrace::force_capture());
-        let mut panics = PANICS.lock().unwrap_or_else(PoisonError::into_inner);
-        panics.push(info.to_string());
-    }));
-}
-
-/// The panics since the last call.
-fn panics() -> Vec<String> {
-    std::mem::take(&mut *PANICS.lock().unwrap_or_else(PoisonError::into_inner))
-}
-
-/// The numbers of the runs that are a shard's, of as many as `GAURAST_FUZZ_RUNS` says, or `usual`.
-fn runs(case: &Case, usual: u64) -> Range<u64> {
-    let number = |variable, otherwise| match std::env::var(variable) {
-        Ok(text) => text.parse().expect("a number"),
-        Err(_) => otherwise,
-    };
-    let first: u64 = number("GAURAST_FUZZ_FIRST", 0);
-    let Range { start, end } = case.shard().range(number("GAURAST_FUZZ_RUNS", usual));
-    first + start..first + end
-}
-
-/// Reports whether so many runs are enough for all outcomes.
-fn are_many(runs: &Range<u64>) -> bool {
-    runs.end - runs.start >= 100
-}
+use watch::{are_many, panics, runs, watch_panics};
 
 /// The files that fuzzing of a target begins with.
 fn corpus(name: &str) -> Vec<Vec<u8>> {

@@ -10,7 +10,7 @@ use rand::seq::IndexedRandom;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::{are_many, panics, runs, watch_panics};
+use super::watch::{are_many, panics, runs, watch_panics};
 
 /// The kept compute shaders that use buffers alone, and some of random control flow.
 fn seeds() -> Vec<(String, Vec<u32>, Layout)> {

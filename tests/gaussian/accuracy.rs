@@ -10,11 +10,11 @@ use gaurast::vk::{
 use gaurast_runner::{Case, Need, data, simd_levels};
 use gaurast_scene::Scene;
 use gaurast_scene::camera::{Camera, DEFAULT_FOV};
-use gaurast_tests::compare::{Limits, assert_contract};
-use gaurast_tests::contexts::{
-    Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target,
+use gaurast_testkit::for_levels::ForLevels;
+use gaurast_testkit::{
+    GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Settings, Target,
 };
-use gaurast_tests::for_levels::ForLevels;
+use gaurast_tests::compare::{Limits, assert_contract};
 use gaurast_tests::oracle::{OracleCamera, OracleState, Reference, render_bounded};
 use gaurast_tests::scenes::{self, SceneBuffers};
 use glam::DVec3;
@@ -29,28 +29,29 @@ pub(crate) type State = PipelineGaussianStateCreateInfoGAURAST<'static>;
 /// Devices of a SIMD level: with one thread, and with two.
 pub(crate) struct Devices<'a> {
     level: &'a str,
-    contexts: [Context; 2],
+    gpus: [Gpu; 2],
 }
 
 impl<'a> Devices<'a> {
     pub(crate) fn new(level: &'a str) -> Self {
-        let contexts = [1, 2].map(|threads| {
-            Context::embedded(&Settings {
+        let gpus = [1, 2].map(|threads| {
+            Gpu::embedded(&Settings {
                 simd: Some(level),
                 threads: Some(threads),
                 ..Settings::default()
             })
+            .expect("a device")
         });
-        Self { level, contexts }
+        Self { level, gpus }
     }
 
     /// Draws `scene` in `state` from each of `views` on both devices and judges the pictures. Levels share the oracle's,
     /// which `name` and a view's name tell apart.
     pub(crate) fn judge(&self, name: &str, scene: &SceneBuffers, state: State, views: &[View]) {
         let [images, same] = self
-            .contexts
+            .gpus
             .each_ref()
-            .map(|context| draw(context, scene, state, views));
+            .map(|gpu| draw(gpu, scene, state, views));
         for ((view, image), same) in views.iter().zip(images).zip(same) {
             let reference = reference(name, scene, state, view);
             let name = format!("{name}, {}, {}", view.name, self.level);
@@ -87,30 +88,30 @@ pub(crate) struct View {
 
 /// Pictures of `scene`.
 pub(crate) fn draw(
-    context: &Context,
+    gpu: &Gpu,
     scene: &SceneBuffers,
     state: State,
     views: &[View],
 ) -> Vec<Vec<[f32; 4]>> {
-    let options = PipelineOptions {
+    let options = GaussianOptions {
         state,
         // The device draws degree 3 at most; the oracle is asked for no more.
-        ..PipelineOptions::new(scene.degree)
+        ..GaussianOptions::new(scene.degree)
     };
-    let pipeline = Pipeline::new(context, &options);
-    let on_device = DeviceScene::new(context, scene);
+    let pipeline = GaussianPipeline::new(gpu, &options);
+    let on_device = GaussianScene::new(gpu, scene);
     let draw = |view: &View| {
-        let target = Target::new(context, options.format, view.size);
-        context.run(|commands| {
+        let target = Target::floats(gpu, view.size);
+        gpu.run(|commands| {
             commands.pass(&target, &Pass::clear([0.0; 4]), || {
-                commands.bind(&pipeline, &on_device, &view.camera);
-                commands.draw([on_device.count, 1, 0, 0]);
+                on_device.bind(commands, &pipeline, &view.camera);
+                commands.draw(0..on_device.count);
             });
         });
         target.read()
     };
     let images = views.iter().map(draw).collect();
-    assert_eq!(context.messages(), []);
+    assert_eq!(gpu.messages(), []);
     images
 }
 
@@ -259,12 +260,12 @@ fn unscented_projection_keeps_the_contract_through_every_camera(case: &Case) {
 
 #[gaurast_runner::test]
 fn orders_give_different_pictures() {
-    let context = Context::embedded(&Settings::default());
+    let gpu = Gpu::embedded(&Settings::default()).expect("a device");
     let scene = scenes::cloud(12, 3000, 0);
     let view = generated_view(Limits::ENVELOPE_ONLY);
     let picture = |order| {
         let mut drawn = draw(
-            &context,
+            &gpu,
             &scene,
             State::default().order(order),
             std::slice::from_ref(&view),

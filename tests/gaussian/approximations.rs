@@ -6,8 +6,8 @@ use gaurast::vk::{
     PipelineGaussianStateCreateInfoGAURAST as State,
 };
 use gaurast_runner::{Case, simd_levels};
-use gaurast_tests::contexts::{
-    Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target,
+use gaurast_testkit::{
+    GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Settings, Target,
 };
 use gaurast_tests::oracle::spherical_harmonics::{coefficient_count, color};
 use gaurast_tests::oracle::{OracleState, Reference, render_bounded};
@@ -53,7 +53,7 @@ fn all_scenes() -> [(&'static str, SceneBuffers); 4] {
 }
 
 /// A picture, with the approximation's structure if that is given.
-fn draw(context: &Context, scene: &SceneBuffers, allowed: Option<[f32; 2]>) -> Vec<[f32; 4]> {
+fn draw(gpu: &Gpu, scene: &SceneBuffers, allowed: Option<[f32; 2]>) -> Vec<[f32; 4]> {
     let [error, budget] = allowed.unwrap_or_default();
     let approximation = Approximation::default()
         .exponential_error(error)
@@ -62,21 +62,21 @@ fn draw(context: &Context, scene: &SceneBuffers, allowed: Option<[f32; 2]>) -> V
     if allowed.is_some() {
         state.p_next = (&raw const approximation).cast();
     }
-    let options = PipelineOptions {
+    let options = GaussianOptions {
         state,
-        ..PipelineOptions::new(scene.degree)
+        ..GaussianOptions::new(scene.degree)
     };
-    let pipeline = Pipeline::new(context, &options);
-    let on_device = DeviceScene::new(context, scene);
-    let target = Target::new(context, options.format, SIZE);
-    context.run(|commands| {
+    let pipeline = GaussianPipeline::new(gpu, &options);
+    let on_device = GaussianScene::new(gpu, scene);
+    let target = Target::floats(gpu, SIZE);
+    gpu.run(|commands| {
         commands.pass(&target, &Pass::clear([0.0; 4]), || {
             let camera = scenes::camera(SIZE[0], SIZE[1]).to_vulkan();
-            commands.bind(&pipeline, &on_device, &camera);
-            commands.draw([on_device.count, 1, 0, 0]);
+            on_device.bind(commands, &pipeline, &camera);
+            commands.draw(0..on_device.count);
         });
     });
-    assert_eq!(context.messages(), []);
+    assert_eq!(gpu.messages(), []);
     target.read()
 }
 
@@ -89,11 +89,12 @@ fn reference(scene: &SceneBuffers) -> Reference {
     )
 }
 
-fn context(threads: usize) -> Context {
-    Context::embedded(&Settings {
+fn gpu(threads: usize) -> Gpu {
+    Gpu::embedded(&Settings {
         threads: Some(threads),
         ..Settings::default()
     })
+    .expect("a device")
 }
 
 /// How far each pixel lies outside of the oracle's envelope, where `range` is the range of colours: of it for colours,
@@ -130,13 +131,13 @@ fn range(scene: &SceneBuffers) -> f64 {
 
 #[gaurast_runner::test]
 fn pictures_are_no_further_off_than_is_allowed() {
-    let context = context(2);
+    let gpu = gpu(2);
     let state = State::default();
     // Where a pixel is finished before the Gaussian that would leave less than the floor, so much light may be left.
     let finished = f64::from(state.transmittance_floor) / (1.0 - f64::from(state.alpha_ceiling));
     for (scene_name, scene) in all_scenes() {
         let (reference, range) = (reference(&scene), range(&scene));
-        let exact = draw(&context, &scene, None);
+        let exact = draw(&gpu, &scene, None);
         for allowed @ [error, budget] in [
             [1e-4, 0.0],
             [2e-3, 0.0],
@@ -144,7 +145,7 @@ fn pictures_are_no_further_off_than_is_allowed() {
             [0.0, 16.0 / 255.0],
             [2e-3, 4.0 / 255.0],
         ] {
-            let image = draw(&context, &scene, Some(allowed));
+            let image = draw(&gpu, &scene, Some(allowed));
             let name = format!("{scene_name}, {allowed:?}");
             // In a small picture few blocks of sparse scenes run out of light, and what is awkward may hide all behind
             // alphas at the ceiling.
@@ -178,15 +179,12 @@ fn pictures_are_no_further_off_than_is_allowed() {
 
 #[gaurast_runner::test]
 fn what_allows_nothing_is_as_without() {
-    let context = context(2);
+    let gpu = gpu(2);
     for (name, scene) in all_scenes() {
-        let without = draw(&context, &scene, None);
-        assert!(draw(&context, &scene, Some([0.0; 2])) == without, "{name}");
+        let without = draw(&gpu, &scene, None);
+        assert!(draw(&gpu, &scene, Some([0.0; 2])) == without, "{name}");
         // Below what the device has a cheaper way for.
-        assert!(
-            draw(&context, &scene, Some([1e-6, 0.0])) == without,
-            "{name}"
-        );
+        assert!(draw(&gpu, &scene, Some([1e-6, 0.0])) == without, "{name}");
     }
 }
 
@@ -195,12 +193,13 @@ fn threads_change_nothing(case: &Case) {
     let allowed = Some([2e-3, 4.0 / 255.0]);
     let scene = scenes::cloud(21, 3000, 1);
     let picture = |threads| {
-        let context = Context::embedded(&Settings {
+        let gpu = Gpu::embedded(&Settings {
             simd: Some(case.variant()),
             threads: Some(threads),
             ..Settings::default()
-        });
-        draw(&context, &scene, allowed)
+        })
+        .expect("a device");
+        draw(&gpu, &scene, allowed)
     };
     assert!(picture(1) == picture(3));
 }

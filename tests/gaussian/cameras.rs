@@ -2,10 +2,10 @@
 
 use gaurast::vk::{GaussianCameraGAURAST, PipelineGaussianStateCreateInfoGAURAST};
 use gaurast_runner::{Case, simd_levels};
-use gaurast_tests::compare::{Limits, assert_contract};
-use gaurast_tests::contexts::{
-    Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target,
+use gaurast_testkit::{
+    GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Settings, Target,
 };
+use gaurast_tests::compare::{Limits, assert_contract};
 use gaurast_tests::oracle::{OracleCamera, OracleState, render_bounded};
 use gaurast_tests::scenes::{self, SceneBuffers};
 
@@ -15,26 +15,26 @@ type State = PipelineGaussianStateCreateInfoGAURAST<'static>;
 const SIZE: [u32; 2] = [208, 104];
 
 fn draw(
-    context: &Context,
+    gpu: &Gpu,
     scene: &SceneBuffers,
     state: State,
     camera: &GaussianCameraGAURAST,
     size: [u32; 2],
 ) -> Vec<[f32; 4]> {
-    let options = PipelineOptions {
+    let options = GaussianOptions {
         state,
-        ..PipelineOptions::new(scene.degree)
+        ..GaussianOptions::new(scene.degree)
     };
-    let pipeline = Pipeline::new(context, &options);
-    let on_device = DeviceScene::new(context, scene);
-    let target = Target::new(context, options.format, size);
-    context.run(|commands| {
+    let pipeline = GaussianPipeline::new(gpu, &options);
+    let on_device = GaussianScene::new(gpu, scene);
+    let target = Target::floats(gpu, size);
+    gpu.run(|commands| {
         commands.pass(&target, &Pass::clear([0.0; 4]), || {
-            commands.bind(&pipeline, &on_device, camera);
-            commands.draw([on_device.count, 1, 0, 0]);
+            on_device.bind(commands, &pipeline, camera);
+            commands.draw(0..on_device.count);
         });
     });
-    assert_eq!(context.messages(), []);
+    assert_eq!(gpu.messages(), []);
     target.read()
 }
 
@@ -55,7 +55,7 @@ fn difference(a: &[[f32; 4]], b: &[[f32; 4]]) -> f32 {
 
 #[gaurast_runner::test]
 fn a_panorama_that_turns_shows_the_same_further_to_the_left() {
-    let context = Context::embedded(&Settings::default());
+    let gpu = Gpu::embedded(&Settings::default()).expect("a device");
     let mut scene = scenes::cloud(21, 2000, 1);
     // Some that are wide, and one that holds the pole.
     for (index, scale) in scene.scales.iter_mut().enumerate().take(60) {
@@ -66,12 +66,12 @@ fn a_panorama_that_turns_shows_the_same_further_to_the_left() {
     scene.opacities[7] = 0.9;
     // Low floors, so that decisions change little, and ellipses are large.
     let state = State::default().alpha_floor(1e-6).transmittance_floor(0.0);
-    let straight = draw(&context, &scene, state, &panorama(0), SIZE);
+    let straight = draw(&gpu, &scene, state, &panorama(0), SIZE);
     let covered = straight.iter().filter(|pixel| pixel[3] > 0.1).count();
     assert!(covered > straight.len() / 10, "{covered}");
     let [width, _] = SIZE.map(|side| side as usize);
     for quarters in 1..4 {
-        let turned = draw(&context, &scene, state, &panorama(quarters), SIZE);
+        let turned = draw(&gpu, &scene, state, &panorama(quarters), SIZE);
         let moved: Vec<[f32; 4]> = (0..straight.len())
             .map(|at| {
                 let (y, x) = (at / width, at % width);
@@ -85,7 +85,7 @@ fn a_panorama_that_turns_shows_the_same_further_to_the_left() {
 
 #[gaurast_runner::test]
 fn what_straddles_the_seam_is_seen_on_both_sides() {
-    let context = Context::embedded(&Settings::default());
+    let gpu = Gpu::embedded(&Settings::default()).expect("a device");
     // Straight behind the camera, above the horizon.
     let scene = SceneBuffers {
         positions: vec![[0.2, -0.6, 2.0]],
@@ -95,7 +95,7 @@ fn what_straddles_the_seam_is_seen_on_both_sides() {
         sh: vec![[1.0; 3]],
         degree: 0,
     };
-    let picture = draw(&context, &scene, State::default(), &panorama(0), SIZE);
+    let picture = draw(&gpu, &scene, State::default(), &panorama(0), SIZE);
     let [width, height] = SIZE.map(|side| side as usize);
     let alpha = |x: usize, y: usize| picture[y * width + x][3];
     let row = height / 2 - (0.5f32.atan2(3.0) * height as f32 / std::f32::consts::PI) as usize;
@@ -109,10 +109,11 @@ fn what_straddles_the_seam_is_seen_on_both_sides() {
 
 #[gaurast_runner::test(each = simd_levels())]
 fn a_gaussian_over_a_pole_is_no_denser_than_elsewhere(case: &Case) {
-    let context = Context::embedded(&Settings {
+    let gpu = Gpu::embedded(&Settings {
         simd: Some(case.variant()),
         ..Settings::default()
-    });
+    })
+    .expect("a device");
     let above = [[0.2, -2.1, 5.0], [0.25, 1.4, 4.98], [1.2, 0.4, 5.1]];
     let scene = SceneBuffers {
         positions: above.to_vec(),
@@ -125,7 +126,7 @@ fn a_gaussian_over_a_pole_is_no_denser_than_elsewhere(case: &Case) {
     let (camera, state) = (panorama(1), State::default());
     let oracle = OracleCamera::new(&camera, SIZE).expect("a panorama");
     let expected = render_bounded(&scene.as_oracle(), &oracle, &OracleState::from(&state));
-    let picture = draw(&context, &scene, state, &camera, SIZE);
+    let picture = draw(&gpu, &scene, state, &camera, SIZE);
     assert_contract("poles", &picture, &expected, Limits::ENVELOPE_ONLY);
     let [width, _] = SIZE.map(|side| side as usize);
     // It holds the pole, hence all longitudes, once each.

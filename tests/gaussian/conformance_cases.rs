@@ -2,7 +2,7 @@
 
 use gaurast_conformance::{Outcome, all, cases, open, run};
 use gaurast_runner::{Case, Variant};
-use gaurast_tests::contexts::{Settings, with_settings};
+use gaurast_testkit::{Settings, with_settings};
 
 fn chapters() -> Vec<Variant> {
     cases::chapters().map(Variant::new).collect()

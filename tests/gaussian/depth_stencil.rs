@@ -5,11 +5,11 @@
 
 use ash::vk;
 use gaurast::vk::{GaussianCameraGAURAST, GaussianOrderGAURAST};
-use gaurast_tests::compare::{Limits, assert_contract};
-use gaurast_tests::contexts::Settings;
-use gaurast_tests::hybrid::{
-    GaussianOptions, GaussianPipeline, GaussianScene, Held, depth_format, held,
+use gaurast_testkit::{
+    Attachments, GaussianOptions, GaussianPipeline, GaussianScene, Settings, over,
 };
+use gaurast_tests::compare::{Limits, assert_contract};
+use gaurast_tests::hybrid::{Held, depth_format, held};
 use gaurast_tests::oracle::{
     OracleCamera, OracleStencil, OracleTests, TestedReference, render_tested,
 };
@@ -119,7 +119,7 @@ struct Case {
     reverse: bool,
     /// The viewport's depths of 0 and 1.
     range: [f32; 2],
-    options: GaussianOptions,
+    options: GaussianOptions<'static>,
 }
 
 impl Case {
@@ -129,7 +129,10 @@ impl Case {
             target: target(depth, samples),
             reverse: false,
             range: [0.0, 1.0],
-            options: GaussianOptions::default(),
+            options: GaussianOptions {
+                blend: vec![over()],
+                ..GaussianOptions::new(0)
+            },
         }
     }
 
@@ -176,7 +179,13 @@ impl Case {
             },
         );
         let gaussians = scene.map(|scene| {
-            let pipeline = GaussianPipeline::new(gpu, &target, scene.degree, &self.options);
+            let options = GaussianOptions {
+                stored_degree: scene.degree,
+                drawn_degree: scene.degree,
+                formats: target.attachment_formats(),
+                ..self.options.clone()
+            };
+            let pipeline = GaussianPipeline::new(gpu, &options);
             (pipeline, GaussianScene::new(gpu, scene))
         });
         let pass = Pass {

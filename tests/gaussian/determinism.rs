@@ -4,11 +4,11 @@
 use ash::vk;
 use gaurast::vk::GaussianCameraGAURAST;
 use gaurast_runner::{Case, simd_levels};
-use gaurast_tests::compare::{Limits, assert_contract};
-use gaurast_tests::contexts::{
-    Buffer, Commands, Context, DeviceScene, Pass, PassObject, Pipeline, PipelineOptions, Settings,
-    Target, over,
+use gaurast_testkit::{
+    Buffer, Commands, Formats, GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass,
+    PassObject, Settings, Target, TargetOptions, over,
 };
+use gaurast_tests::compare::{Limits, assert_contract};
 use gaurast_tests::oracle::{OracleCamera, OracleState, render_bounded};
 use gaurast_tests::scenes::{self, SceneBuffers};
 use half::f16;
@@ -53,9 +53,9 @@ fn joined(mut a: SceneBuffers, b: &SceneBuffers) -> SceneBuffers {
 
 /// A device, a scene on it, and what draws it into a 32-bit float target of [`SIZE`].
 struct Bench {
-    context: Context,
-    pipeline: Pipeline,
-    scene: DeviceScene,
+    gpu: Gpu,
+    pipeline: GaussianPipeline,
+    scene: GaussianScene,
     camera: GaussianCameraGAURAST<'static>,
 }
 
@@ -64,26 +64,26 @@ impl Bench {
         Self::with(
             scene,
             &Settings::default(),
-            &PipelineOptions::new(scene.degree),
+            &GaussianOptions::new(scene.degree),
         )
     }
 
-    fn with(scene: &SceneBuffers, settings: &Settings, options: &PipelineOptions) -> Self {
-        let context = Context::embedded(settings);
+    fn with(scene: &SceneBuffers, settings: &Settings, options: &GaussianOptions) -> Self {
+        let gpu = Gpu::embedded(settings).expect("a device");
         Self {
-            pipeline: Pipeline::new(&context, options),
-            scene: DeviceScene::new(&context, scene),
+            pipeline: GaussianPipeline::new(&gpu, options),
+            scene: GaussianScene::new(&gpu, scene),
             camera: camera().to_vulkan(),
-            context,
+            gpu,
         }
     }
 
     fn target(&self) -> Target {
-        Target::new(&self.context, vk::Format::R32G32B32A32_SFLOAT, SIZE)
+        Target::floats(&self.gpu, SIZE)
     }
 
     /// The texels after `record` in a pass over nothing, with the scene bound.
-    fn draw(&self, record: impl FnOnce(&Commands<'_>)) -> Vec<[f32; 4]> {
+    fn draw(&self, record: impl FnOnce(&Commands)) -> Vec<[f32; 4]> {
         self.draw_to(&self.target(), &Pass::clear([0.0; 4]), record)
     }
 
@@ -91,21 +91,21 @@ impl Bench {
         &self,
         target: &Target,
         pass: &Pass,
-        record: impl FnOnce(&Commands<'_>),
+        record: impl FnOnce(&Commands),
     ) -> Vec<T> {
-        self.context.run(|commands| {
+        self.gpu.run(|commands| {
             commands.pass(target, pass, || {
-                commands.bind(&self.pipeline, &self.scene, &self.camera);
+                self.scene.bind(commands, &self.pipeline, &self.camera);
                 record(commands);
             });
         });
-        assert_eq!(self.context.messages(), []);
+        assert_eq!(self.gpu.messages(), []);
         target.read()
     }
 
     /// The whole scene, with one `vkCmdDraw`.
     fn whole(&self) -> Vec<[f32; 4]> {
-        self.draw(|commands| commands.draw([self.scene.count, 1, 0, 0]))
+        self.draw(|commands| commands.draw(0..self.scene.count))
     }
 }
 
@@ -149,7 +149,7 @@ fn threads_change_nothing(case: &Case) {
             threads: Some(threads),
             ..Settings::default()
         };
-        Bench::with(&scene, &settings, &PipelineOptions::new(scene.degree)).whole()
+        Bench::with(&scene, &settings, &GaussianOptions::new(scene.degree)).whole()
     };
     let one = draw(1);
     for threads in [2, 3, 8] {
@@ -171,10 +171,10 @@ fn drawing_again_changes_nothing() {
 fn indices_that_name_every_gaussian_are_a_draw_without_indices() {
     let bench = Bench::new(&scene());
     let indices: Vec<u32> = (0..bench.scene.count).collect();
-    let indices = Buffer::of(&bench.context, &indices);
+    let indices = Buffer::of(&bench.gpu, &indices);
     let indexed = bench.draw(|commands| {
-        commands.bind_indices(&indices);
-        commands.draw_indexed(bench.scene.count, 0, 0);
+        commands.indices(&indices, 0, vk::IndexType::UINT32);
+        commands.draw_indexed(0..bench.scene.count, 0);
     });
     assert_same(&bench.whole(), &indexed);
 }
@@ -190,10 +190,10 @@ fn the_order_of_indices_matters_for_ties_only() {
     let bench = Bench::new(&scene);
     assert_ne!(count % 1009, 0, "what follows is a permutation");
     let shuffled: Vec<u32> = (0..count).map(|i| (i * 1009 % count) as u32).collect();
-    let indices = Buffer::of(&bench.context, &shuffled);
+    let indices = Buffer::of(&bench.gpu, &shuffled);
     let indexed = bench.draw(|commands| {
-        commands.bind_indices(&indices);
-        commands.draw_indexed(bench.scene.count, 0, 0);
+        commands.indices(&indices, 0, vk::IndexType::UINT32);
+        commands.draw_indexed(0..bench.scene.count, 0);
     });
     assert_same(&bench.whole(), &indexed);
 
@@ -205,10 +205,10 @@ fn the_order_of_indices_matters_for_ties_only() {
     });
     let backwards: Vec<u32> = (0..200).rev().collect();
     let bench = Bench::new(&flat);
-    let indices = Buffer::of(&bench.context, &backwards);
+    let indices = Buffer::of(&bench.gpu, &backwards);
     let indexed = bench.draw(|commands| {
-        commands.bind_indices(&indices);
-        commands.draw_indexed(200, 0, 0);
+        commands.indices(&indices, 0, vk::IndexType::UINT32);
+        commands.draw_indexed(0..200, 0);
     });
     let reversed = (0..200).rev().map(|i| part(&flat, i..i + 1));
     let reversed = reversed.reduce(|a, b| joined(a, &b)).expect("some");
@@ -224,27 +224,27 @@ fn a_part_of_the_buffers_is_a_scene_of_its_own() {
     let expected = Bench::new(&part(&scene, first..first + count)).whole();
     let (first, count) = (first as u32, count as u32);
 
-    let with_first = bench.draw(|commands| commands.draw([count, 1, first, 0]));
+    let with_first = bench.draw(|commands| commands.draw(first..first + count));
     assert_same(&expected, &with_first);
 
     let indices: Vec<u32> = (0..bench.scene.count).collect();
-    let indices = Buffer::of(&bench.context, &indices);
+    let indices = Buffer::of(&bench.gpu, &indices);
     let with_first_index = bench.draw(|commands| {
-        commands.bind_indices(&indices);
-        commands.draw_indexed(count, first, 0);
+        commands.indices(&indices, 0, vk::IndexType::UINT32);
+        commands.draw_indexed(first..first + count, 0);
     });
     assert_same(&expected, &with_first_index);
     let with_offset = bench.draw(|commands| {
-        commands.bind_indices(&indices);
-        commands.draw_indexed(count, 0, first as i32);
+        commands.indices(&indices, 0, vk::IndexType::UINT32);
+        commands.draw_indexed(0..count, first as i32);
     });
     assert_same(&expected, &with_offset);
     let with_both = bench.draw(|commands| {
-        commands.bind_indices(&indices);
-        commands.draw_indexed(count, first + 300, -300);
+        commands.indices(&indices, 0, vk::IndexType::UINT32);
+        commands.draw_indexed(first + 300..first + 300 + count, -300);
     });
     assert_same(&expected, &with_both);
-    let indirect = Buffer::of(&bench.context, &[[count, 1, first, 0_u32]]);
+    let indirect = Buffer::of(&bench.gpu, &[[count, 1, first, 0_u32]]);
     let with_indirect = bench.draw(|commands| commands.draw_indirect(&indirect, 1));
     assert_same(&expected, &with_indirect);
 }
@@ -256,7 +256,7 @@ fn instances_draw_every_gaussian_again() {
     let twice = joined(scene.clone(), &scene);
     let expected = Bench::new(&twice).whole();
     let bench = Bench::new(&scene);
-    let drawn = bench.draw(|commands| commands.draw([bench.scene.count, 2, 0, 5]));
+    let drawn = bench.draw(|commands| commands.draw_instances(0..bench.scene.count, 5..5 + 2));
     assert_same(&expected, &drawn);
 }
 
@@ -268,9 +268,9 @@ fn attributes_advance_by_instance() {
     let mut mixed = shapes.clone();
     mixed.opacities.clone_from(&looks.opacities);
     mixed.sh.clone_from(&looks.sh);
-    let options = PipelineOptions {
+    let options = GaussianOptions {
         looks_by_instance: true,
-        ..PipelineOptions::new(0)
+        ..GaussianOptions::new(0)
     };
     // The first instance is 1.
     let mut expected = SceneBuffers::default();
@@ -281,7 +281,7 @@ fn attributes_advance_by_instance() {
         expected = joined(expected, &copy);
     }
     let bench = Bench::with(&mixed, &Settings::default(), &options);
-    let drawn = bench.draw(|commands| commands.draw([300, 3, 0, 1]));
+    let drawn = bench.draw(|commands| commands.draw_instances(0..300, 1..1 + 3));
     assert_same(&Bench::new(&expected).whole(), &drawn);
 }
 
@@ -290,8 +290,8 @@ fn empty_draws_draw_nothing() {
     let bench = Bench::new(&scene());
     let background = [0.25, 0.5, 0.75, 1.0];
     let drawn: Vec<[f32; 4]> = bench.draw_to(&bench.target(), &Pass::clear(background), |c| {
-        c.draw([0, 1, 0, 0]);
-        c.draw([bench.scene.count, 0, 0, 0]);
+        c.draw(0..0);
+        c.draw_instances(0..bench.scene.count, 0..0);
     });
     assert_same(&vec![background; drawn.len()], &drawn);
 }
@@ -302,7 +302,7 @@ fn what_is_not_covered_keeps_its_colour_even_where_draws_replace() {
     let bench = Bench::new(&scene);
     let background = [0.25, 0.5, 0.75, 1.0];
     let drawn: Vec<[f32; 4]> = bench.draw_to(&bench.target(), &Pass::clear(background), |c| {
-        c.draw([bench.scene.count, 1, 0, 0]);
+        c.draw(0..bench.scene.count);
     });
     let reference = render_bounded(&scene.as_oracle(), &camera(), &OracleState::default());
     let (mut kept, mut replaced) = (0, 0);
@@ -328,23 +328,16 @@ fn the_viewport_says_where_the_camera_s_picture_is() {
     let [width, height] = SIZE;
     for [x, y] in [[0, 0], [16, 32], [7, 5], [64, 64]] {
         let size = [width + 70, height + 70];
-        let target = Target::new(&bench.context, vk::Format::R32G32B32A32_SFLOAT, size);
+        let target = Target::floats(&bench.gpu, size);
         let corner = [x as f32, y as f32];
         let whole_size = [width as f32, height as f32];
-        let draw = |viewport| -> Vec<[f32; 4]> {
+        let draw = |viewport: [f32; 4]| -> Vec<[f32; 4]> {
             bench.draw_to(&target, &Pass::clear([0.0; 4]), |commands| {
-                commands.viewport(viewport);
-                commands.draw([bench.scene.count, 1, 0, 0]);
+                commands.viewport(viewport, [0.0, 1.0]);
+                commands.draw(0..bench.scene.count);
             })
         };
-        let drawn = draw(vk::Viewport {
-            x: corner[0],
-            y: corner[1],
-            width: whole_size[0],
-            height: whole_size[1],
-            min_depth: 0.0,
-            max_depth: 1.0,
-        });
+        let drawn = draw([corner[0], corner[1], whole_size[0], whole_size[1]]);
         let rows = drawn
             .chunks(size[0] as usize)
             .skip(y as usize)
@@ -356,14 +349,12 @@ fn the_viewport_says_where_the_camera_s_picture_is() {
         assert_contract(&name, &within, &reference, Limits::ENVELOPE_ONLY);
 
         // A flipped viewport covers the same pixels, and cameras don't flip.
-        let flipped = draw(vk::Viewport {
-            x: corner[0],
-            y: corner[1] + whole_size[1],
-            width: whole_size[0],
-            height: -whole_size[1],
-            min_depth: 0.0,
-            max_depth: 1.0,
-        });
+        let flipped = draw([
+            corner[0],
+            corner[1] + whole_size[1],
+            whole_size[0],
+            -whole_size[1],
+        ]);
         assert!(drawn == flipped, "{name}");
     }
 }
@@ -383,8 +374,9 @@ fn the_scissor_cuts_and_changes_nothing_else() {
         let background = [0.25, 0.5, 0.75, 1.0];
         let cut: Vec<[f32; 4]> =
             bench.draw_to(&bench.target(), &Pass::clear(background), |commands| {
-                commands.scissor(scissor);
-                commands.draw([bench.scene.count, 1, 0, 0]);
+                let (offset, extent) = (scissor.offset, scissor.extent);
+                commands.scissor([offset.x, offset.y], [extent.width, extent.height]);
+                commands.draw(0..bench.scene.count);
             });
         assert_same(&inside(&whole, scissor, background), &cut);
     }
@@ -408,7 +400,7 @@ fn the_render_area_cuts_and_changes_nothing_else() {
             ..Pass::clear([0.0; 4])
         };
         let cut: Vec<[f32; 4]> = bench.draw_to(&target, &pass, |commands| {
-            commands.draw([bench.scene.count, 1, 0, 0]);
+            commands.draw(0..bench.scene.count);
         });
         assert_same(&inside(&whole, area, background), &cut);
     }
@@ -433,14 +425,14 @@ fn inside(image: &[[f32; 4]], rect: vk::Rect2D, outside: [f32; 4]) -> Vec<[f32; 
 fn blending_composites_over_the_background() {
     let scene = scene();
     let alone = Bench::new(&scene).whole();
-    let options = PipelineOptions {
-        blend: over(),
-        ..PipelineOptions::new(scene.degree)
+    let options = GaussianOptions {
+        blend: vec![over()],
+        ..GaussianOptions::new(scene.degree)
     };
     let bench = Bench::with(&scene, &Settings::default(), &options);
     for background in [[0.2, 0.4, 0.6, 1.0], [0.0; 4], [3.0, 0.1, 0.05, 0.3]] {
         let blended = bench.draw_to(&bench.target(), &Pass::clear(background), |commands| {
-            commands.draw([bench.scene.count, 1, 0, 0]);
+            commands.draw(0..bench.scene.count);
         });
         let expected: Vec<[f64; 4]> = alone
             .iter()
@@ -460,9 +452,9 @@ fn composite(front: [f64; 4], behind: [f64; 4]) -> [f64; 4] {
 fn draws_of_a_pass_are_composited_in_their_order() {
     // Each draw is sorted within itself: a later one is over an earlier one at any depth.
     let scene = scenes::cloud(26, 3000, 1);
-    let options = PipelineOptions {
-        blend: over(),
-        ..PipelineOptions::new(scene.degree)
+    let options = GaussianOptions {
+        blend: vec![over()],
+        ..GaussianOptions::new(scene.degree)
     };
     let bench = Bench::with(&scene, &Settings::default(), &options);
     let background = [0.1, 0.2, 0.3, 0.4];
@@ -480,9 +472,9 @@ fn draws_of_a_pass_are_composited_in_their_order() {
         };
         behind.into_iter().enumerate().map(over).collect()
     });
-    let record = |commands: &Commands<'_>| {
+    let record = |commands: &Commands| {
         for range in &parts {
-            commands.draw([range.len() as u32, 1, range.start as u32, 0]);
+            commands.draw(range.start as u32..range.start as u32 + range.len() as u32);
         }
     };
     let drawn: Vec<[f32; 4]> = bench.draw_to(&bench.target(), &Pass::clear(background), record);
@@ -497,7 +489,7 @@ fn draws_of_a_pass_are_composited_in_their_order() {
         .iter()
         .map(|range| [range.len() as u32, 1, range.start as u32, 0])
         .collect();
-    let numbers = Buffer::of(&bench.context, &numbers);
+    let numbers = Buffer::of(&bench.gpu, &numbers);
     let indirect = bench.draw_to(&bench.target(), &Pass::clear(background), |commands| {
         commands.draw_indirect(&numbers, parts.len() as u32);
     });
@@ -508,8 +500,8 @@ fn draws_of_a_pass_are_composited_in_their_order() {
     bench.draw_to::<[f32; 4]>(&target, &Pass::clear(background), |_| ());
     let mut passes = Vec::new();
     for range in &parts {
-        passes = bench.draw_to(&target, &Pass::default(), |commands| {
-            commands.draw([range.len() as u32, 1, range.start as u32, 0]);
+        passes = bench.draw_to(&target, &Pass::load(), |commands| {
+            commands.draw(range.start as u32..range.start as u32 + range.len() as u32);
         });
     }
     assert_same(&drawn, &passes);
@@ -522,34 +514,30 @@ fn a_render_pass_object_is_dynamic_rendering() {
     let background = [0.5, 0.25, 0.125, 1.0];
     let pass = Pass::clear(background);
     let expected: Vec<[f32; 4]> = dynamic.draw_to(&dynamic.target(), &pass, |commands| {
-        commands.draw([dynamic.scene.count, 1, 0, 0]);
+        commands.draw(0..dynamic.scene.count);
     });
 
     let Bench {
-        context,
+        gpu,
         scene: on_device,
         camera,
         ..
     } = dynamic;
-    let target = Target::new(&context, vk::Format::R32G32B32A32_SFLOAT, SIZE);
-    let object = PassObject::new(&context, &target);
-    let options = PipelineOptions {
-        render_pass: object.render_pass,
-        ..PipelineOptions::new(scene.degree)
+    let target = Target::floats(&gpu, SIZE);
+    let object = PassObject::new(&target);
+    let options = GaussianOptions {
+        render_pass: Some(object.render_pass),
+        ..GaussianOptions::new(scene.degree)
     };
-    let pipeline = Pipeline::new(&context, &options);
-    let pass = Pass {
-        object: Some(&object),
-        ..pass
-    };
-    context.run(|commands| {
-        commands.pass(&target, &pass, || {
-            commands.bind(&pipeline, &on_device, &camera);
-            commands.draw([on_device.count, 1, 0, 0]);
+    let pipeline = GaussianPipeline::new(&gpu, &options);
+    gpu.run(|commands| {
+        commands.pass(&object, &pass, || {
+            on_device.bind(commands, &pipeline, &camera);
+            commands.draw(0..on_device.count);
         });
     });
     assert_same(&expected, &target.read());
-    assert_eq!(context.messages(), []);
+    assert_eq!(gpu.messages(), []);
 }
 
 #[gaurast_runner::test]
@@ -557,15 +545,21 @@ fn formats_differ_by_their_quantisation_alone() {
     let scene = scene();
     let exact = Bench::new(&scene).whole();
     let draw = |format| {
-        let options = PipelineOptions {
-            format,
-            ..PipelineOptions::new(scene.degree)
+        let options = GaussianOptions {
+            formats: Formats::of(format),
+            ..GaussianOptions::new(scene.degree)
         };
         let bench = Bench::with(&scene, &Settings::default(), &options);
-        let target = Target::new(&bench.context, format, SIZE);
+        let target = Target::new(
+            &bench.gpu,
+            &TargetOptions {
+                size: SIZE,
+                ..TargetOptions::of(format)
+            },
+        );
         let pass = Pass::clear([0.0; 4]);
         bench.draw_to::<u8>(&target, &pass, |commands| {
-            commands.draw([bench.scene.count, 1, 0, 0]);
+            commands.draw(0..bench.scene.count);
         });
         (bench, target)
     };

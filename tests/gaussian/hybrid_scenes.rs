@@ -8,11 +8,9 @@ use gaurast::vk::GaussianCameraGAURAST;
 use gaurast_runner::{Need, data};
 use gaurast_scene::Scene;
 use gaurast_scene::camera::DEFAULT_FOV;
-use gaurast_tests::compare::{Limits, assert_contract, for_people};
-use gaurast_tests::contexts::Settings;
-use gaurast_tests::hybrid::{
-    GaussianOptions, GaussianPipeline, GaussianScene, Held, ToClip, depth_format, held,
-};
+use gaurast_testkit::{GaussianOptions, GaussianPipeline, GaussianScene, Settings, for_people};
+use gaurast_tests::compare::{Limits, assert_contract};
+use gaurast_tests::hybrid::{Held, ToClip, depth_format, held};
 use gaurast_tests::oracle::{OracleCamera, OracleTests, render_tested, sample_tests::compare};
 use gaurast_tests::scenes::SceneBuffers;
 use gaurast_tests::triangles::models::Model;
@@ -98,11 +96,9 @@ impl Hybrid {
         let triangles = Pipeline::new(gpu, &target, &options);
         let gaussians = GaussianPipeline::new(
             gpu,
-            &target,
-            self.scene.degree,
             &GaussianOptions {
                 depth_stencil: self.state(),
-                ..GaussianOptions::default()
+                ..GaussianOptions::over(self.scene.degree, &target)
             },
         );
         let scene = GaussianScene::new(gpu, &self.scene);
@@ -161,7 +157,7 @@ impl Hybrid {
             stencil: None,
         };
         let camera = OracleCamera::new(&self.camera, SIZE).expect("a pinhole");
-        let state = (&GaussianOptions::default().state).into();
+        let state = (&GaussianOptions::new(0).state).into();
         let scene = self.scene.as_oracle();
         let drawn = render_tested(&scene, &camera, &state, &tests, &head.stored);
         let behind: Vec<_> = head.color.iter().map(|c| c.map(f64::from)).collect();

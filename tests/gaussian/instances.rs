@@ -6,11 +6,12 @@ use gaurast::vk::{
     GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 use gaurast_runner::{Case, simd_levels};
-use gaurast_tests::compare::{Limits, assert_contract};
-use gaurast_tests::contexts::{
-    Buffer, Context, DeviceScene, Instance, Pass, Pipeline, PipelineOptions, Settings, Target,
+use gaurast_testkit::for_levels::ForLevels;
+use gaurast_testkit::{
+    Buffer, GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Instance, Pass, Settings,
+    Target, bind_instances,
 };
-use gaurast_tests::for_levels::ForLevels;
+use gaurast_tests::compare::{Limits, assert_contract};
 use gaurast_tests::oracle::{
     OracleCamera, OracleInstance, OracleScene, OracleState, Reference, render_bounded,
 };
@@ -51,18 +52,18 @@ impl Way<'_> {
     }
 }
 
-fn draw(context: &Context, scene: &SceneBuffers, way: &Way<'_>) -> Vec<[f32; 4]> {
-    let options = PipelineOptions {
+fn draw(gpu: &Gpu, scene: &SceneBuffers, way: &Way<'_>) -> Vec<[f32; 4]> {
+    let options = GaussianOptions {
         state: way.state,
         half: way.half,
         instances: way.instances.map(|(_, rate)| rate),
-        ..PipelineOptions::new(scene.degree)
+        ..GaussianOptions::new(scene.degree)
     };
-    let pipeline = Pipeline::new(context, &options);
+    let pipeline = GaussianPipeline::new(gpu, &options);
     let on_device = if way.half {
-        DeviceScene::half(context, scene)
+        GaussianScene::half(gpu, scene)
     } else {
-        DeviceScene::new(context, scene)
+        GaussianScene::new(gpu, scene)
     };
     let placed = way.instances.map(|(instances, rate)| {
         let flat = |instance: &OracleInstance| -> Instance {
@@ -74,21 +75,21 @@ fn draw(context: &Context, scene: &SceneBuffers, way: &Way<'_>) -> Vec<[f32; 4]>
             vk::VertexInputRate::INSTANCE => instances.len() as u32,
             _ => 1,
         };
-        (Buffer::of(context, &flat), count)
+        (Buffer::of(gpu, &flat), count)
     });
-    let target = Target::new(context, options.format, SIZE);
-    context.run(|commands| {
+    let target = Target::floats(gpu, SIZE);
+    gpu.run(|commands| {
         commands.pass(&target, &Pass::clear([0.0; 4]), || {
-            commands.bind(&pipeline, &on_device, &way.camera);
+            on_device.bind(commands, &pipeline, &way.camera);
             let mut count = 1;
             if let Some((buffer, instances)) = &placed {
-                commands.bind_instances(buffer);
+                bind_instances(commands, buffer);
                 count = *instances;
             }
-            commands.draw([on_device.count, count, 0, 0]);
+            commands.draw_instances(0..on_device.count, 0..count);
         });
     });
-    assert_eq!(context.messages(), []);
+    assert_eq!(gpu.messages(), []);
     target.read()
 }
 
@@ -119,12 +120,13 @@ fn reference(
 }
 
 /// A device of the case's SIMD level.
-fn device(case: &Case) -> Context {
-    Context::embedded(&Settings {
+fn device(case: &Case) -> Gpu {
+    Gpu::embedded(&Settings {
         simd: Some(case.variant()),
         threads: Some(2),
         ..Settings::default()
     })
+    .expect("a device")
 }
 
 /// Matrices that turn, stretch, shear, mirror and move, one that is singular and one that is none, and factors.
@@ -181,7 +183,7 @@ fn instances_keep_the_contract_through_every_camera(case: &Case) {
         State::default().linearization(GaussianLinearizationGAURAST::UNSCENTED),
     ];
     static REFERENCES: ForLevels<Reference> = ForLevels::new();
-    let context = device(case);
+    let gpu = device(case);
     for (name, camera) in cameras() {
         for state in states {
             let name = format!("{name}, {:?}, {:?}", state.order, state.linearization);
@@ -194,7 +196,7 @@ fn instances_keep_the_contract_through_every_camera(case: &Case) {
                 instances: Some((&instances, vk::VertexInputRate::INSTANCE)),
                 ..Way::new(camera)
             };
-            let picture = draw(&context, &scene, &way);
+            let picture = draw(&gpu, &scene, &way);
             let name = format!("{name}, {}", case.variant());
             assert_contract(&name, &picture, &expected, Limits::ENVELOPE_ONLY);
         }
@@ -257,7 +259,7 @@ fn an_instance_is_a_scene_that_was_transformed_before(case: &Case) {
         opacity: 1.0,
     });
     static REFERENCES: ForLevels<Reference> = ForLevels::new();
-    let context = device(case);
+    let gpu = device(case);
     // Together in one sorted set, as one draw or as one instance each.
     for state in [
         State::default(),
@@ -271,14 +273,14 @@ fn an_instance_is_a_scene_that_was_transformed_before(case: &Case) {
             instances: Some((&instances, vk::VertexInputRate::INSTANCE)),
             ..Way::new(camera)
         };
-        let picture = draw(&context, &scene, &way);
+        let picture = draw(&gpu, &scene, &way);
         assert_contract(case.variant(), &picture, &expected, Limits::ENVELOPE_ONLY);
     }
 }
 
 #[gaurast_runner::test]
 fn every_vertex_may_have_a_matrix_of_its_own() {
-    let context = Context::embedded(&Settings::default());
+    let gpu = Gpu::embedded(&Settings::default()).expect("a device");
     let scene = scenes::cloud(33, 300, 0);
     let some = any_instances(33);
     let of_vertex: Vec<OracleInstance> = (0..300).map(|vertex| some[vertex % some.len()]).collect();
@@ -286,7 +288,7 @@ fn every_vertex_may_have_a_matrix_of_its_own() {
         instances: Some((&of_vertex, vk::VertexInputRate::VERTEX)),
         ..Way::new(pinhole())
     };
-    let picture = draw(&context, &scene, &way);
+    let picture = draw(&gpu, &scene, &way);
     let camera = OracleCamera::new(&way.camera, SIZE).expect("a pinhole");
     let whole = OracleScene {
         instances: &of_vertex,
@@ -310,12 +312,12 @@ fn half_floats_are_the_floats_that_they_are(case: &Case) {
         degree: scene.degree,
     };
     let way = Way::new(pinhole());
-    let context = device(case);
-    let half = draw(&context, &scene, &Way { half: true, ..way });
-    let float = draw(&context, &rounded, &way);
+    let gpu = device(case);
+    let half = draw(&gpu, &scene, &Way { half: true, ..way });
+    let float = draw(&gpu, &rounded, &way);
     assert!(half == float);
     // Eleven bits of a position are a thousandth of it; the picture moves by a fraction of a pixel.
-    let exact = draw(&context, &scene, &way);
+    let exact = draw(&gpu, &scene, &way);
     let pairs = exact.as_flattened().iter().zip(half.as_flattened());
     let squares: f64 = pairs.map(|(a, b)| f64::from(a - b).powi(2)).sum();
     let deviation = (squares / (4 * exact.len()) as f64).sqrt();
@@ -352,14 +354,14 @@ fn a_scene_that_moves_far_away_with_its_camera_looks_the_same(case: &Case) {
         matrix,
         opacity: 1.0,
     }];
-    let context = device(case);
+    let gpu = device(case);
     let by_matrix = Way {
         instances: Some((&instances, vk::VertexInputRate::INSTANCE)),
         ..Way::new(far)
     };
     for (name, picture) in [
-        ("by its positions", draw(&context, &moved, &Way::new(far))),
-        ("by a matrix", draw(&context, &scene, &by_matrix)),
+        ("by its positions", draw(&gpu, &moved, &Way::new(far))),
+        ("by a matrix", draw(&gpu, &scene, &by_matrix)),
     ] {
         let name = format!("{name}, {}", case.variant());
         assert_contract(&name, &picture, &expected, Limits::ENVELOPE_ONLY);

@@ -10,6 +10,7 @@ mod given_scenes;
 mod hybrid_scenes;
 mod instances;
 mod interleavings;
+mod packets;
 mod popping;
 mod rasterization_modes;
 mod recorded_work;

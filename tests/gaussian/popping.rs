@@ -4,15 +4,16 @@
 //! should never overtake each other. What a step's new order changes is measured without any
 //! warping of pictures: the next view is drawn in its own order and in that of the view before.
 
+use ash::vk;
 use gaurast::vk::{
     GaussianCameraGAURAST, GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 use gaurast_runner::{Need, data};
 use gaurast_scene::camera::DEFAULT_FOV;
-use gaurast_tests::compare::{Limits, assert_contract};
-use gaurast_tests::contexts::{
-    Buffer, Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target,
+use gaurast_testkit::{
+    Buffer, GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Settings, Target,
 };
+use gaurast_tests::compare::{Limits, assert_contract};
 use gaurast_tests::oracle::project::project;
 use gaurast_tests::oracle::rays::rounded;
 use gaurast_tests::oracle::{OracleCamera, OracleOrder, OracleState, render_bounded};
@@ -63,48 +64,47 @@ fn keys(
 
 /// A scene that can be drawn in any order.
 struct Bench {
-    context: Context,
+    gpu: Gpu,
     scene: SceneBuffers,
-    on_device: DeviceScene,
-    as_named: Pipeline,
+    on_device: GaussianScene,
+    as_named: GaussianPipeline,
 }
 
 impl Bench {
     fn new(scene: SceneBuffers) -> Self {
-        let context = Context::embedded(&Settings::default());
+        let gpu = Gpu::embedded(&Settings::default()).expect("a device");
         Self {
-            on_device: DeviceScene::new(&context, &scene),
-            as_named: Self::pipeline(&context, &scene, GaussianOrderGAURAST::PRIMITIVE),
-            context,
+            on_device: GaussianScene::new(&gpu, &scene),
+            as_named: Self::pipeline(&gpu, &scene, GaussianOrderGAURAST::PRIMITIVE),
+            gpu,
             scene,
         }
     }
 
-    fn pipeline(context: &Context, scene: &SceneBuffers, order: GaussianOrderGAURAST) -> Pipeline {
-        let options = PipelineOptions {
+    fn pipeline(gpu: &Gpu, scene: &SceneBuffers, order: GaussianOrderGAURAST) -> GaussianPipeline {
+        let options = GaussianOptions {
             state: PipelineGaussianStateCreateInfoGAURAST::default().order(order),
-            ..PipelineOptions::new(scene.degree)
+            ..GaussianOptions::new(scene.degree)
         };
-        Pipeline::new(context, &options)
+        GaussianPipeline::new(gpu, &options)
     }
 
     fn draw(
         &self,
-        pipeline: &Pipeline,
+        pipeline: &GaussianPipeline,
         camera: &GaussianCameraGAURAST,
         order: Option<&[u32]>,
     ) -> Picture {
-        let format = PipelineOptions::new(0).format;
-        let target = Target::new(&self.context, format, SIZE);
-        let indices = order.map(|order| Buffer::of(&self.context, order));
-        self.context.run(|commands| {
+        let target = Target::floats(&self.gpu, SIZE);
+        let indices = order.map(|order| Buffer::of(&self.gpu, order));
+        self.gpu.run(|commands| {
             commands.pass(&target, &Pass::clear([0.0; 4]), || {
-                commands.bind(pipeline, &self.on_device, camera);
+                self.on_device.bind(commands, pipeline, camera);
                 match &indices {
-                    None => commands.draw([self.on_device.count, 1, 0, 0]),
+                    None => commands.draw(0..self.on_device.count),
                     Some(indices) => {
-                        commands.bind_indices(indices);
-                        commands.draw_indexed(self.on_device.count, 0, 0);
+                        commands.indices(indices, 0, vk::IndexType::UINT32);
+                        commands.draw_indexed(0..self.on_device.count, 0);
                     }
                 }
             });
@@ -114,7 +114,7 @@ impl Bench {
 
     /// The greatest change of a channel of any step's picture by its new order.
     fn popping(&self, camera: &GaussianCameraGAURAST<'static>, order: GaussianOrderGAURAST) -> f32 {
-        let sorted = Self::pipeline(&self.context, &self.scene, order);
+        let sorted = Self::pipeline(&self.gpu, &self.scene, order);
         let names = |camera: &GaussianCameraGAURAST| {
             let keys = keys(&self.scene, camera, order);
             let mut names: Vec<u32> = (0..self.on_device.count).collect();
@@ -282,7 +282,7 @@ fn turning_pops_nowhere_where_each_pixel_sorts_for_itself() {
     // These are the orders that the device draws in.
     let bench = Bench::new(cloud);
     let order = GaussianOrderGAURAST::PER_PIXEL;
-    let pipeline = Bench::pipeline(&bench.context, &bench.scene, order);
+    let pipeline = Bench::pipeline(&bench.gpu, &bench.scene, order);
     let picture = bench.draw(&pipeline, &camera, None);
     let state = OracleState {
         order: OracleOrder::PerPixel,

@@ -3,7 +3,7 @@
 
 use ash::vk;
 use gaurast_runner::{Case, Need, Variant};
-use gaurast_tests::contexts::Settings;
+use gaurast_testkit::Settings;
 use gaurast_tests::recorded::{Agreement, read};
 use gaurast_tests::triangles::Gpu;
 

@@ -5,8 +5,8 @@ use std::path::Path;
 use gaurast_render::Renderer;
 use gaurast_runner::{Need, data};
 use gaurast_scene::camera::Camera;
+use gaurast_testkit::{Settings, with_settings};
 use gaurast_tests::compare::Statistics;
-use gaurast_tests::contexts::{Settings, with_settings};
 
 /// A scene, and a picture that another renderer made of it.
 pub(super) struct Given {

@@ -2,8 +2,8 @@
 
 use gaurast_conformance::{Draw, Implementation, Outcome, Second, all, cases, run};
 use gaurast_runner::{Case, Need, Variant, data};
+use gaurast_testkit::{Gpu, Settings};
 use gaurast_tests::compare::{Limits, assert_contract};
-use gaurast_tests::contexts::{Context, Settings};
 use gaurast_tests::oracle::{OracleCamera, OracleState, Stored, render_bounded};
 use gaurast_tests::scenes::{self, SceneBuffers};
 
@@ -18,8 +18,8 @@ const LIMITS: Limits = Limits {
 };
 
 /// Holds the pictures of both implementations against the oracle's.
-fn judge(context: &Context, name: &str, scene: &SceneBuffers, state: State, views: &[View]) {
-    let pictures = draw(context, scene, state, views);
+fn judge(gpu: &Gpu, name: &str, scene: &SceneBuffers, state: State, views: &[View]) {
+    let pictures = draw(gpu, scene, state, views);
     for (view, drawn) in views.iter().zip(pictures) {
         let name = format!("{name}, {}", view.name);
         let camera = OracleCamera::new(&view.camera, view.size).expect("a pinhole");
@@ -43,8 +43,8 @@ fn judge(context: &Context, name: &str, scene: &SceneBuffers, state: State, view
     }
 }
 
-fn context() -> Context {
-    Context::embedded(&Settings::default())
+fn gpu() -> Gpu {
+    Gpu::embedded(&Settings::default()).expect("a device")
 }
 
 /// Views of generated scenes: from in front, from the middle, where Gaussians lie at the near plane and all around, turned
@@ -80,24 +80,24 @@ fn generated_views() -> Vec<View> {
 
 #[gaurast_runner::test]
 fn both_draw_generated_scenes_in_every_state_and_degree() {
-    let context = context();
+    let gpu = gpu();
     for (seed, degree) in [(41, 0), (42, 1), (43, 2), (44, 3), (45, 4)] {
         let scene = scenes::cloud(seed, 2500, degree);
         for (name, state) in states() {
             let name = format!("cloud {seed} {name}");
-            judge(&context, &name, &scene, state, &generated_views());
+            judge(&gpu, &name, &scene, state, &generated_views());
         }
     }
 }
 
 #[gaurast_runner::test]
 fn both_draw_needles_discs_giants_and_what_lies_at_the_near_plane() {
-    let context = context();
+    let gpu = gpu();
     for seed in 300..330 {
         let scene = scenes::awkward(seed, 10 + 2 * (seed % 20) as usize, (seed % 4) as u32);
         for (name, state) in states() {
             let name = format!("awkward {seed} {name}");
-            judge(&context, &name, &scene, state, &generated_views());
+            judge(&gpu, &name, &scene, state, &generated_views());
         }
     }
 }
@@ -112,7 +112,7 @@ fn both_draw_the_synthetic_scene() {
         limits: Limits::ENVELOPE_ONLY,
     };
     let scene = SceneBuffers::from(&scenes::synthetic(1, 60_000));
-    judge(&context(), "synthetic", &scene, State::default(), &[view]);
+    judge(&gpu(), "synthetic", &scene, State::default(), &[view]);
 }
 
 #[gaurast_runner::test]
@@ -129,7 +129,7 @@ fn both_draw_far_from_the_origin() {
             .camera
             .eye(view.camera.eye.map(|c| c + f64::from(away) + 1.0 / 7.0));
     }
-    judge(&context(), "far", &scene, State::default(), &views);
+    judge(&gpu(), "far", &scene, State::default(), &views);
 }
 
 /// The trained scene of a file, from three sides.
@@ -139,7 +139,7 @@ fn both_draw(name: &'static str) {
     views.retain(|view| view.size == [640, 480]);
     assert_eq!(views.len(), 3);
     let scene = SceneBuffers::from(&scene);
-    judge(&context(), name, &scene, State::default(), &views);
+    judge(&gpu(), name, &scene, State::default(), &views);
 }
 
 #[gaurast_runner::test(needs = [Need::Data(SKULL)])]

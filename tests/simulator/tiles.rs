@@ -1,6 +1,7 @@
 //! Lists of tiles for the rasterizer module: those of scenes, and generated ones that press it.
 
-use gaurast_oracle::oracle::project::{Splat, project};
+use gaurast_oracle::oracle::project::project;
+use gaurast_oracle::oracle::splat::Splat;
 use gaurast_oracle::oracle::{OracleCamera, OracleState};
 use gaurast_oracle::scenes::SceneBuffers;
 use rand::seq::IndexedRandom;

@@ -1,9 +1,6 @@
-//! What the project's tests share: the reference renderer, generated scenes, image comparison,
-//! devices to draw on, compute kernels, programs made up at random, and scenes of triangles.
+//! What the project's tests share beside their Vulkan application ([`gaurast_testkit`]): compute kernels, programs made
+//! up at random, scenes of triangles, input for fuzzing.
 
-pub mod compare;
-pub mod contexts;
-pub mod for_levels;
 pub mod fuzzing;
 pub mod hybrid;
 pub mod kernels;
@@ -13,4 +10,4 @@ pub mod recorded;
 pub mod triangles;
 pub mod what_ifs;
 
-pub use gaurast_oracle::{oracle, scenes};
+pub use gaurast_oracle::{compare, oracle, scenes};

@@ -5,10 +5,10 @@ use gaurast::vk::{GaussianAntialiasingGAURAST, GaussianCameraGAURAST, GaussianOr
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::contexts::{
-    Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target, over,
-};
 use crate::scenes::{Gaussian, SceneBuffers};
+use gaurast_testkit::{
+    GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Settings, Target, over,
+};
 
 /// How many scenes there are.
 pub const SCENES: usize = 24;
@@ -17,7 +17,7 @@ pub const SCENES: usize = 24;
 struct Scene {
     buffers: SceneBuffers,
     camera: GaussianCameraGAURAST<'static>,
-    options: PipelineOptions<'static>,
+    options: GaussianOptions<'static>,
     size: [u32; 2],
     /// How often it is drawn over itself, in one pass.
     draws: u32,
@@ -46,7 +46,7 @@ impl Scene {
         };
         let count = 1 + number * 37 % 700;
         let buffers = SceneBuffers::new(degree, (0..count).map(&mut gaussian));
-        let mut options = PipelineOptions::new(degree);
+        let mut options = GaussianOptions::new(degree);
         options.state = options
             .state
             .order(
@@ -63,7 +63,7 @@ impl Scene {
                 ][number % 2],
             )
             .transmittance_floor([1e-4, 0.0][number / 2 % 2]);
-        options.blend = over();
+        options.blend = vec![over()];
         Self {
             buffers,
             camera: GaussianCameraGAURAST::default()
@@ -76,15 +76,15 @@ impl Scene {
     }
 
     /// Draws it with objects of its own, all of which are gone afterwards.
-    fn draw(&self, context: &Context) -> Vec<[f32; 4]> {
-        let pipeline = Pipeline::new(context, &self.options);
-        let scene = DeviceScene::new(context, &self.buffers);
-        let target = Target::new(context, self.options.format, self.size);
-        context.run(|commands| {
+    fn draw(&self, gpu: &Gpu) -> Vec<[f32; 4]> {
+        let pipeline = GaussianPipeline::new(gpu, &self.options);
+        let scene = GaussianScene::new(gpu, &self.buffers);
+        let target = Target::floats(gpu, self.size);
+        gpu.run(|commands| {
             commands.pass(&target, &Pass::clear([0.0; 4]), || {
-                commands.bind(&pipeline, &scene, &self.camera);
+                scene.bind(commands, &pipeline, &self.camera);
                 for _ in 0..self.draws {
-                    commands.draw([scene.count, 1, 0, 0]);
+                    commands.draw(0..scene.count);
                 }
             });
         });
@@ -107,18 +107,19 @@ pub struct Report {
 /// # Panics
 /// If a scene's picture is ever another than it was at first, or if memory grows by more than 16 MiB.
 pub fn run(frames: usize, mut progress: impl FnMut(usize)) -> Report {
-    let context = Context::embedded(&Settings {
+    let gpu = Gpu::embedded(&Settings {
         threads: Some(2),
         ..Settings::default()
-    });
+    })
+    .expect("a device");
     let scenes: Vec<_> = (0..SCENES).map(Scene::new).collect();
-    let first: Vec<_> = scenes.iter().map(|scene| scene.draw(&context)).collect();
+    let first: Vec<_> = scenes.iter().map(|scene| scene.draw(&gpu)).collect();
     assert!(first.iter().flatten().any(|pixel| pixel[3] > 0.0));
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let mut held = vec![memory("VmRSS:")];
     for frame in 0..frames {
         let number = rng.random_range(0..SCENES);
-        let drawn = scenes[number].draw(&context);
+        let drawn = scenes[number].draw(&gpu);
         let same = drawn.iter().zip(&first[number]);
         let same = same
             .clone()
@@ -138,7 +139,7 @@ pub fn run(frames: usize, mut progress: impl FnMut(usize)) -> Report {
             "memory grew from {early} to {late} bytes"
         );
     }
-    assert!(context.messages().is_empty(), "nothing went wrong");
+    assert!(gpu.messages().is_empty(), "nothing went wrong");
     Report { frames, memory }
 }
 

@@ -9,13 +9,13 @@ use simdevice::timing::Config;
 use simdevice::timing::work::FrameWork;
 use timing_studies::what_if::{WhatIf, each_alone, what_ifs};
 
-use crate::contexts::Settings;
-use crate::hybrid::{GaussianOptions, GaussianPipeline, GaussianScene, ToClip};
+use crate::hybrid::ToClip;
 use crate::recorded::read;
 use crate::scenes::SceneBuffers;
 use crate::triangles::{
     Buffer, Gpu, Output, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex, depth_test,
 };
+use gaurast_testkit::{GaussianOptions, GaussianPipeline, GaussianScene, Settings};
 
 const SIZE: [u32; 2] = [640, 360];
 const GAUSSIANS: usize = 150_000;
@@ -127,9 +127,9 @@ fn draw(gpu: &Gpu, with_colonnade: bool) -> Output {
     let buffers = SceneBuffers::from(&gaurast_scene::garden::scene(1, GAUSSIANS));
     let options = GaussianOptions {
         depth_stencil,
-        ..GaussianOptions::default()
+        ..GaussianOptions::over(buffers.degree, &target)
     };
-    let gaussians = GaussianPipeline::new(gpu, &target, buffers.degree, &options);
+    let gaussians = GaussianPipeline::new(gpu, &options);
     let scene = GaussianScene::new(gpu, &buffers);
     let walls = colonnade(&to_clip);
     let buffer = Buffer::of(gpu, &walls);

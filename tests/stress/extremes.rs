@@ -2,20 +2,22 @@
 
 use ash::vk;
 use gaurast::vk::{GaussianCameraGAURAST, GaussianOrderGAURAST, GaussianPrecisionGAURAST};
-use gaurast_tests::compare::{Limits, verdict};
-use gaurast_tests::contexts::{
-    Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target, over, replace,
+use gaurast_testkit::{
+    GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Settings, Target, TargetOptions,
+    opaque, over,
 };
+use gaurast_tests::compare::{Limits, verdict};
 use gaurast_tests::oracle::{OracleCamera, OracleState, render_bounded};
 use gaurast_tests::scenes::{Gaussian, SceneBuffers};
 
 type Camera = GaussianCameraGAURAST<'static>;
 
-fn context() -> Context {
-    Context::embedded(&Settings {
+fn gpu() -> Gpu {
+    Gpu::embedded(&Settings {
         threads: Some(2),
         ..Settings::default()
     })
+    .expect("a device")
 }
 
 fn camera([width, height]: [u32; 2]) -> Camera {
@@ -36,24 +38,21 @@ fn gaussian(z: f32, scale: f32, opacity: f32, color: [f32; 3]) -> Gaussian {
 
 /// Draws instances of a scene to a target.
 fn draw(
-    context: &Context,
+    gpu: &Gpu,
     scene: &SceneBuffers,
-    options: &PipelineOptions,
+    options: &GaussianOptions,
     target: &Target,
     clear: Option<[f32; 4]>,
     instances: u32,
 ) {
-    let size = [target.extent.width, target.extent.height];
-    let pipeline = Pipeline::new(context, options);
-    let on_device = DeviceScene::new(context, scene);
-    let pass = Pass {
-        clear,
-        ..Pass::default()
-    };
-    context.run(|commands| {
+    let size = target.options.size;
+    let pipeline = GaussianPipeline::new(gpu, options);
+    let on_device = GaussianScene::new(gpu, scene);
+    let pass = clear.map_or_else(Pass::load, Pass::clear);
+    gpu.run(|commands| {
         commands.pass(target, &pass, || {
-            commands.bind(&pipeline, &on_device, &camera(size));
-            commands.draw([on_device.count, instances, 0, 0]);
+            on_device.bind(commands, &pipeline, &camera(size));
+            commands.draw_instances(0..on_device.count, 0..instances);
         });
     });
 }
@@ -70,17 +69,10 @@ fn more_than_2_to_the_24_primitives_keep_their_order() {
     let seen = colors.map(|color| gaussian(2.0, 50.0, 1.0 / 128.0, color));
     let scene = SceneBuffers::new(0, unseen.chain(seen.clone()));
     assert!(scene.positions.len() as u64 * u64::from(INSTANCES) > 1 << 24);
-    let context = context();
-    let options = PipelineOptions::new(0);
-    let target = Target::new(&context, options.format, size);
-    draw(
-        &context,
-        &scene,
-        &options,
-        &target,
-        Some([0.0; 4]),
-        INSTANCES,
-    );
+    let gpu = gpu();
+    let options = GaussianOptions::new(0);
+    let target = Target::floats(&gpu, size);
+    draw(&gpu, &scene, &options, &target, Some([0.0; 4]), INSTANCES);
     let image: Vec<[f32; 4]> = target.read();
     let alone = SceneBuffers::new(0, seen.iter().cycle().take(2 * INSTANCES as usize).cloned());
     let view = OracleCamera::new(&camera(size), size).expect("a camera");
@@ -101,10 +93,10 @@ fn thousands_that_fill_a_large_screen_take_bounded_memory() {
         gaussian(2.0 + index as f32 * 1e-3, 1e4, 1.0 / 200.0, color)
     };
     let scene = SceneBuffers::new(0, (0..COUNT).map(one));
-    let context = context();
-    let options = PipelineOptions::new(0);
-    let target = Target::new(&context, options.format, size);
-    draw(&context, &scene, &options, &target, Some([0.0; 4]), 1);
+    let gpu = gpu();
+    let options = GaussianOptions::new(0);
+    let target = Target::floats(&gpu, size);
+    draw(&gpu, &scene, &options, &target, Some([0.0; 4]), 1);
     let image: Vec<[f32; 4]> = target.read();
     // All pixels see the same: the oracle draws one.
     let view =
@@ -127,16 +119,19 @@ fn half_float_targets_overflow_to_infinity_at_most() {
         0,
         (0..3).map(|z| gaussian(2.0 + z as f32, 0.3, 0.99, color)),
     );
-    let context = context();
-    for blend in [replace(), over()] {
-        let options = PipelineOptions {
-            format: vk::Format::R16G16B16A16_SFLOAT,
-            blend,
-            ..PipelineOptions::new(0)
+    let gpu = gpu();
+    for blend in [opaque(), over()] {
+        let half = TargetOptions {
+            size,
+            ..TargetOptions::of(vk::Format::R16G16B16A16_SFLOAT)
         };
-        let target = Target::new(&context, options.format, size);
-        draw(&context, &scene, &options, &target, Some([0.0; 4]), 1);
-        draw(&context, &scene, &options, &target, None, 1);
+        let target = Target::new(&gpu, &half);
+        let options = GaussianOptions {
+            blend: vec![blend],
+            ..GaussianOptions::over(0, &target)
+        };
+        draw(&gpu, &scene, &options, &target, Some([0.0; 4]), 1);
+        draw(&gpu, &scene, &options, &target, None, 1);
         let texels: Vec<[u16; 4]> = target.read();
         let magnitudes = texels.as_flattened().iter().map(|bits| bits & 0x7fff);
         assert!(magnitudes.clone().all(|bits| bits <= 0x7c00), "no NaN");
@@ -170,7 +165,7 @@ fn colors_beyond_every_number_leave_numbers() {
         }
     }
     let scene = SceneBuffers::new(2, gaussians);
-    let context = context();
+    let gpu = gpu();
     for precision in [
         GaussianPrecisionGAURAST::FLOAT32,
         GaussianPrecisionGAURAST::FLOAT16,
@@ -185,7 +180,7 @@ fn colors_beyond_every_number_leave_numbers() {
             {
                 continue;
             }
-            let mut options = PipelineOptions::new(2);
+            let mut options = GaussianOptions::new(2);
             options.state = options
                 .state
                 .precision(precision)
@@ -193,8 +188,8 @@ fn colors_beyond_every_number_leave_numbers() {
                 .alpha_floor(0.0)
                 .alpha_ceiling(1.0)
                 .transmittance_floor(0.0);
-            let target = Target::new(&context, options.format, size);
-            draw(&context, &scene, &options, &target, Some([0.0; 4]), 1);
+            let target = Target::floats(&gpu, size);
+            draw(&gpu, &scene, &options, &target, Some([0.0; 4]), 1);
             let image: Vec<[f32; 4]> = target.read();
             assert!(
                 image.as_flattened().iter().all(|c| !c.is_nan()),
@@ -252,14 +247,14 @@ fn flushing_to_zero_changes_nothing() {
     let size = [40, 36];
     let black = [-4.0; 3];
     let scene = SceneBuffers::new(0, [gaussian(2.0, 0.2, 0.7, black)]);
-    let options = PipelineOptions {
-        blend: over(),
-        ..PipelineOptions::new(0)
+    let options = GaussianOptions {
+        blend: vec![over()],
+        ..GaussianOptions::new(0)
     };
     let picture = || {
-        let context = context();
-        let target = Target::new(&context, options.format, size);
-        draw(&context, &scene, &options, &target, Some([1e-39; 4]), 1);
+        let gpu = gpu();
+        let target = Target::floats(&gpu, size);
+        draw(&gpu, &scene, &options, &target, Some([1e-39; 4]), 1);
         target.read::<[u32; 4]>()
     };
     let expected = picture();

@@ -5,10 +5,10 @@ use gaurast::vk::{
     GaussianAntialiasingGAURAST, GaussianCameraGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 use gaurast_runner::{Case, simd_levels};
-use gaurast_tests::compare::{Limits, assert_contract};
-use gaurast_tests::contexts::{
-    Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target,
+use gaurast_testkit::{
+    GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Settings, Target,
 };
+use gaurast_tests::compare::{Limits, assert_contract};
 use gaurast_tests::oracle::{OracleCamera, OracleState, render_bounded};
 use gaurast_tests::scenes::{Gaussian, SceneBuffers};
 
@@ -41,22 +41,23 @@ fn checked(case: &Case, gaussians: &[Gaussian], camera: &Camera, state: &State) 
     let scene = SceneBuffers::new(0, gaussians.iter().cloned());
     let view = OracleCamera::new(camera, SIZE).expect("a camera");
     let reference = render_bounded(&scene.as_oracle(), &view, &OracleState::from(state));
-    let context = Context::embedded(&Settings {
+    let gpu = Gpu::embedded(&Settings {
         simd: Some(case.variant()),
         threads: Some(2),
         ..Settings::default()
-    });
-    let options = PipelineOptions {
+    })
+    .expect("a device");
+    let options = GaussianOptions {
         state: *state,
-        ..PipelineOptions::new(0)
+        ..GaussianOptions::new(0)
     };
-    let pipeline = Pipeline::new(&context, &options);
-    let on_device = DeviceScene::new(&context, &scene);
-    let target = Target::new(&context, options.format, SIZE);
-    context.run(|commands| {
+    let pipeline = GaussianPipeline::new(&gpu, &options);
+    let on_device = GaussianScene::new(&gpu, &scene);
+    let target = Target::floats(&gpu, SIZE);
+    gpu.run(|commands| {
         commands.pass(&target, &Pass::clear([0.0; 4]), || {
-            commands.bind(&pipeline, &on_device, camera);
-            commands.draw([on_device.count, 1, 0, 0]);
+            on_device.bind(commands, &pipeline, camera);
+            commands.draw(0..on_device.count);
         });
     });
     let image: Image = target.read();

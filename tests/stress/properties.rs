@@ -1,10 +1,9 @@
 //! Properties that pictures have whatever is drawn, on scenes made up at random.
 
-use ash::vk;
 use gaurast::vk::{GaussianCameraGAURAST, GaussianOrderGAURAST, GaussianPrecisionGAURAST};
 use gaurast_runner::{Case, Variant, simd_levels};
-use gaurast_tests::contexts::{
-    Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target, over,
+use gaurast_testkit::{
+    GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Settings, Target, over,
 };
 use gaurast_tests::scenes::{Gaussian, SceneBuffers};
 use proptest::prelude::*;
@@ -49,35 +48,35 @@ fn buffers(gaussians: &[Gaussian]) -> SceneBuffers {
 
 /// Draws sets of Gaussians one after the other, each over what was drawn before.
 fn draw(
-    context: &Context,
+    gpu: &Gpu,
     sets: &[&[Gaussian]],
-    options: &PipelineOptions,
+    options: &GaussianOptions,
     camera: &Camera,
 ) -> Vec<[f32; 4]> {
-    let pipeline = Pipeline::new(context, options);
+    let pipeline = GaussianPipeline::new(gpu, options);
     let on_device: Vec<_> = sets
         .iter()
-        .map(|set| DeviceScene::new(context, &buffers(set)))
+        .map(|set| GaussianScene::new(gpu, &buffers(set)))
         .collect();
-    let target = Target::new(context, options.format, SIZE);
-    context.run(|commands| {
+    let target = Target::floats(gpu, SIZE);
+    gpu.run(|commands| {
         commands.pass(&target, &Pass::clear([0.0; 4]), || {
             for set in &on_device {
-                commands.bind(&pipeline, set, camera);
-                commands.draw([set.count, 1, 0, 0]);
+                set.bind(commands, &pipeline, camera);
+                commands.draw(0..set.count);
             }
         });
     });
     target.read()
 }
 
-fn one(context: &Context, gaussians: &[Gaussian], camera: &Camera) -> Vec<[f32; 4]> {
-    draw(context, &[gaussians], &PipelineOptions::new(0), camera)
+fn one(gpu: &Gpu, gaussians: &[Gaussian], camera: &Camera) -> Vec<[f32; 4]> {
+    draw(gpu, &[gaussians], &GaussianOptions::new(0), camera)
 }
 
 /// Without floors, since those flip whole contributions where rounding differs.
-fn without_floors() -> PipelineOptions<'static> {
-    let mut options = PipelineOptions::new(0);
+fn without_floors() -> GaussianOptions<'static> {
+    let mut options = GaussianOptions::new(0);
     options.state = options.state.alpha_floor(0.0).transmittance_floor(0.0);
     options
 }
@@ -106,43 +105,43 @@ proptest! {
     /// The order of the draw matters for ties only.
     #[gaurast_runner::test]
     fn order_does_not_matter(seed: u64, count in 1..150usize) {
-        let context = Context::embedded(&Settings::default());
+        let gpu = Gpu::embedded(&Settings::default()).expect("a device");
         let mut gaussians = scene(seed, count);
-        let sorted = one(&context, &gaussians, &camera());
+        let sorted = one(&gpu, &gaussians, &camera());
         gaussians.shuffle(&mut ChaCha8Rng::seed_from_u64(!seed));
-        prop_assert!(sorted == one(&context, &gaussians, &camera()));
+        prop_assert!(sorted == one(&gpu, &gaussians, &camera()));
     }
 
     /// Where scene and camera are together does not matter, to the last bit where no coordinate is rounded.
     #[gaurast_runner::test]
     fn place_does_not_matter(seed: u64, count in 1..150usize, offset in prop::array::uniform3(-4096..4096i32)) {
-        let context = Context::embedded(&Settings::default());
+        let gpu = Gpu::embedded(&Settings::default()).expect("a device");
         let mut gaussians = scene(seed, count);
-        let here = one(&context, &gaussians, &camera());
+        let here = one(&gpu, &gaussians, &camera());
         let offset = offset.map(|o| o as f32);
         for gaussian in &mut gaussians {
             for (p, o) in gaussian.position.iter_mut().zip(offset) {
                 *p += o;
             }
         }
-        let there = one(&context, &gaussians, &camera().eye(offset.map(f64::from)));
+        let there = one(&gpu, &gaussians, &camera().eye(offset.map(f64::from)));
         prop_assert!(here == there);
     }
 
     /// A mirrored scene gives the mirrored picture, to rounding.
     #[gaurast_runner::test]
     fn mirrors_agree(seed: u64, count in 1..60usize) {
-        let context = Context::embedded(&Settings::default());
+        let gpu = Gpu::embedded(&Settings::default()).expect("a device");
         let mut gaussians = scene(seed, count);
         let options = without_floors();
-        let straight = draw(&context, &[&gaussians], &options, &camera());
+        let straight = draw(&gpu, &[&gaussians], &options, &camera());
         for gaussian in &mut gaussians {
             gaussian.position[0] *= -1.0;
             // Mirroring x reverses rotations about y and z.
             gaussian.rotation[2] *= -1.0;
             gaussian.rotation[3] *= -1.0;
         }
-        let mut mirrored = draw(&context, &[&gaussians], &options, &camera());
+        let mut mirrored = draw(&gpu, &[&gaussians], &options, &camera());
         mirrored.chunks_mut(SIZE[0] as usize).for_each(<[_]>::reverse);
         let distance = distance(&straight, &mirrored);
         prop_assert!(distance <= TWO_PICTURES, "{distance:e}");
@@ -152,15 +151,15 @@ proptest! {
     /// no transmittance ends a pixel.
     #[gaurast_runner::test]
     fn a_draw_may_be_cut_by_depth(seed: u64, count in 2..150usize, share in 0.0..1.0f64) {
-        let context = Context::embedded(&Settings::default());
+        let gpu = Gpu::embedded(&Settings::default()).expect("a device");
         let mut gaussians = scene(seed, count);
         gaussians.sort_by(|a, b| a.position[2].total_cmp(&b.position[2]));
-        let mut options = PipelineOptions::new(0);
+        let mut options = GaussianOptions::new(0);
         options.state = options.state.transmittance_floor(0.0);
-        options.blend = over();
-        let whole = draw(&context, &[&gaussians], &options, &camera());
+        options.blend = vec![over()];
+        let whole = draw(&gpu, &[&gaussians], &options, &camera());
         let (near, far) = gaussians.split_at((share * count as f64) as usize);
-        let parts = draw(&context, &[far, near], &options, &camera());
+        let parts = draw(&gpu, &[far, near], &options, &camera());
         let distance = distance(&whole, &parts);
         prop_assert!(distance <= TWO_PICTURES, "{distance:e}");
     }
@@ -169,14 +168,14 @@ proptest! {
     /// as the floor over the least that a layer can let through.
     #[gaurast_runner::test]
     fn a_cut_shows_no_more_than_the_floor(seed: u64, count in 2..150usize, share in 0.0..1.0f64) {
-        let context = Context::embedded(&Settings::default());
+        let gpu = Gpu::embedded(&Settings::default()).expect("a device");
         let mut gaussians = scene(seed, count);
         gaussians.sort_by(|a, b| a.position[2].total_cmp(&b.position[2]));
-        let mut options = PipelineOptions::new(0);
-        options.blend = over();
-        let whole = draw(&context, &[&gaussians], &options, &camera());
+        let mut options = GaussianOptions::new(0);
+        options.blend = vec![over()];
+        let whole = draw(&gpu, &[&gaussians], &options, &camera());
         let (near, far) = gaussians.split_at((share * count as f64) as usize);
-        let parts = draw(&context, &[far, near], &options, &camera());
+        let parts = draw(&gpu, &[far, near], &options, &camera());
         // 1e-4 / (1 - 0.99), times 1 in alpha and less in colours: 0.5 + 1.7 / (2 sqrt(pi)) at most.
         let bound = 1e-2 + 1e-5;
         let distance = distance(&whole, &parts);
@@ -188,7 +187,7 @@ proptest! {
     fn threads_do_not_matter(seed: u64, count in 1..150usize, threads in 2..9usize) {
         let picture = |threads| {
             let settings = Settings { threads: Some(threads), ..Settings::default() };
-            one(&Context::embedded(&settings), &scene(seed, count), &camera())
+            one(&Gpu::embedded(&settings).expect("a device"), &scene(seed, count), &camera())
         };
         prop_assert!(picture(1) == picture(threads));
     }
@@ -196,27 +195,21 @@ proptest! {
     /// Where tiles cut a picture doesn't matter: it is the same wherever the viewport is in a larger target.
     #[gaurast_runner::test]
     fn tiles_do_not_matter(seed: u64, count in 1..100usize, corner in prop::array::uniform2(0..70u32)) {
-        let context = Context::embedded(&Settings::default());
+        let gpu = Gpu::embedded(&Settings::default()).expect("a device");
         let options = without_floors();
         let scene = scene(seed, count);
-        let whole = draw(&context, &[&scene], &options, &camera());
-        let pipeline = Pipeline::new(&context, &options);
-        let on_device = DeviceScene::new(&context, &buffers(&scene));
+        let whole = draw(&gpu, &[&scene], &options, &camera());
+        let pipeline = GaussianPipeline::new(&gpu, &options);
+        let on_device = GaussianScene::new(&gpu, &buffers(&scene));
         let size = [0, 1].map(|axis| SIZE[axis] + corner[axis]);
-        let target = Target::new(&context, options.format, size);
-        let viewport = vk::Viewport {
-            x: corner[0] as f32,
-            y: corner[1] as f32,
-            width: SIZE[0] as f32,
-            height: SIZE[1] as f32,
-            min_depth: 0.0,
-            max_depth: 1.0,
-        };
-        context.run(|commands| {
+        let target = Target::floats(&gpu, size);
+        let [x, y] = corner.map(|c| c as f32);
+        let viewport = [x, y, SIZE[0] as f32, SIZE[1] as f32];
+        gpu.run(|commands| {
             commands.pass(&target, &Pass::clear([0.0; 4]), || {
-                commands.bind(&pipeline, &on_device, &camera());
-                commands.viewport(viewport);
-                commands.draw([on_device.count, 1, 0, 0]);
+                on_device.bind(commands, &pipeline, &camera());
+                commands.viewport(viewport, [0.0, 1.0]);
+                commands.draw(0..on_device.count);
             });
         });
         let moved: Vec<[f32; 4]> = target.read();
@@ -229,22 +222,22 @@ proptest! {
     /// Draws that make one sorted set are one draw, to the bit.
     #[gaurast_runner::test]
     fn draws_may_be_merged(seed: u64, count in 1..150u32, cuts in prop::array::uniform2(0.0..1.0f64)) {
-        let context = Context::embedded(&Settings::default());
-        let options = PipelineOptions::new(0);
+        let gpu = Gpu::embedded(&Settings::default()).expect("a device");
+        let options = GaussianOptions::new(0);
         let mut gaussians = scene(seed, count as usize);
         gaussians.shuffle(&mut ChaCha8Rng::seed_from_u64(!seed));
-        let whole = one(&context, &gaussians, &camera());
+        let whole = one(&gpu, &gaussians, &camera());
         let mut cuts = cuts.map(|cut| (cut * f64::from(count)) as u32);
         cuts.sort_unstable();
-        let pipeline = Pipeline::new(&context, &options);
-        let on_device = DeviceScene::new(&context, &buffers(&gaussians));
-        let target = Target::new(&context, options.format, SIZE);
-        context.run(|commands| {
+        let pipeline = GaussianPipeline::new(&gpu, &options);
+        let on_device = GaussianScene::new(&gpu, &buffers(&gaussians));
+        let target = Target::floats(&gpu, SIZE);
+        gpu.run(|commands| {
             commands.pass(&target, &Pass::clear([0.0; 4]), || {
-                commands.bind(&pipeline, &on_device, &camera());
+                on_device.bind(commands, &pipeline, &camera());
                 commands.gaussian_set(|| {
                     for [from, to] in [[0, cuts[0]], cuts, [cuts[1], count]] {
-                        commands.draw([to - from, 1, from, 0]);
+                        commands.draw(from..to);
                     }
                 });
             });
@@ -255,9 +248,9 @@ proptest! {
     /// Colours are finite and not negative, alpha lies in [0, 1], in both precisions, with floors and without.
     #[gaurast_runner::test]
     fn pictures_are_sane(seed: u64, count in 1..60usize, binary16: bool, floors: bool, per_pixel: bool) {
-        let context = Context::embedded(&Settings::default());
+        let gpu = Gpu::embedded(&Settings::default()).expect("a device");
         let scene = gaurast_tests::scenes::awkward(seed, count, 1);
-        let mut options = PipelineOptions::new(1);
+        let mut options = GaussianOptions::new(1);
         if binary16 {
             options.state = options.state.precision(GaussianPrecisionGAURAST::FLOAT16);
         }
@@ -267,13 +260,13 @@ proptest! {
         if per_pixel && !binary16 {
             options.state = options.state.order(GaussianOrderGAURAST::PER_PIXEL);
         }
-        let pipeline = Pipeline::new(&context, &options);
-        let on_device = DeviceScene::new(&context, &scene);
-        let target = Target::new(&context, options.format, SIZE);
-        context.run(|commands| {
+        let pipeline = GaussianPipeline::new(&gpu, &options);
+        let on_device = GaussianScene::new(&gpu, &scene);
+        let target = Target::floats(&gpu, SIZE);
+        gpu.run(|commands| {
             commands.pass(&target, &Pass::clear([0.0; 4]), || {
-                commands.bind(&pipeline, &on_device, &camera());
-                commands.draw([on_device.count, 1, 0, 0]);
+                on_device.bind(commands, &pipeline, &camera());
+                commands.draw(0..on_device.count);
             });
         });
         for pixel in target.read::<[f32; 4]>() {
@@ -299,8 +292,8 @@ fn levels_agree(case: &Case) {
                 simd: Some(level),
                 ..Settings::default()
             };
-            let context = Context::embedded(&settings);
-            draw(&context, &[&scene], &without_floors(), &camera())
+            let gpu = Gpu::embedded(&settings).expect("a device");
+            draw(&gpu, &[&scene], &without_floors(), &camera())
         });
         let distance = distance(&simplest, &other);
         prop_assert!(distance <= TWO_PICTURES, "{distance:e}");

@@ -1,6 +1,6 @@
 //! Both models of the rasterizer's timing over the stress scenes.
 
-use gaurast_tests::contexts::{Context, Settings};
+use gaurast_testkit::{Gpu, Settings};
 use gaurast_tests::recorded::{Agreement, read};
 
 use super::scenes::all;
@@ -12,12 +12,13 @@ fn models_of_the_rasterizer_agree_on_stress_scenes() {
     let mut agreement = Agreement::default();
     for (number, stress) in all().iter().enumerate() {
         let path = folder.path().join(format!("{number}.json"));
-        let context = Context::embedded(&Settings {
+        let gpu = Gpu::embedded(&Settings {
             trace: Some(&path),
             ..Settings::default()
-        });
-        draw(&context, stress);
-        drop(context);
+        })
+        .expect("a device");
+        draw(&gpu, stress);
+        drop(gpu);
         agreement.add(stress.name, &read(&path));
     }
     agreement.judge(100);

@@ -1,11 +1,11 @@
 //! Every stress scene at every SIMD level against the oracle.
 
 use gaurast_runner::{Case, simd_levels};
-use gaurast_tests::compare::{Limits, assert_contract, verdict};
-use gaurast_tests::contexts::{
-    Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target,
+use gaurast_testkit::for_levels::ForLevels;
+use gaurast_testkit::{
+    GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Settings, Target,
 };
-use gaurast_tests::for_levels::ForLevels;
+use gaurast_tests::compare::{Limits, assert_contract, verdict};
 use gaurast_tests::oracle::{
     OracleCamera, OracleState, Reference, render_binary16, render_bounded,
 };
@@ -13,18 +13,18 @@ use gaurast_tests::oracle::{
 use super::scenes::{Stress, all};
 
 /// Draws a scene.
-pub fn draw(context: &Context, stress: &Stress) -> Vec<[f32; 4]> {
-    let options = PipelineOptions {
+pub fn draw(gpu: &Gpu, stress: &Stress) -> Vec<[f32; 4]> {
+    let options = GaussianOptions {
         state: stress.state,
-        ..PipelineOptions::new(stress.scene.degree)
+        ..GaussianOptions::new(stress.scene.degree)
     };
-    let pipeline = Pipeline::new(context, &options);
-    let on_device = DeviceScene::new(context, &stress.scene);
-    let target = Target::new(context, options.format, stress.size);
-    context.run(|commands| {
+    let pipeline = GaussianPipeline::new(gpu, &options);
+    let on_device = GaussianScene::new(gpu, &stress.scene);
+    let target = Target::floats(gpu, stress.size);
+    gpu.run(|commands| {
         commands.pass(&target, &Pass::clear([0.0; 4]), || {
-            commands.bind(&pipeline, &on_device, &stress.camera);
-            commands.draw([on_device.count, 1, 0, 0]);
+            on_device.bind(commands, &pipeline, &stress.camera);
+            commands.draw(0..on_device.count);
         });
     });
     target.read()
@@ -39,18 +39,19 @@ fn assert_sane(name: &str, image: &[[f32; 4]]) {
 }
 
 /// A device of a SIMD level.
-fn context(level: &str) -> Context {
-    Context::embedded(&Settings {
+fn gpu(level: &str) -> Gpu {
+    Gpu::embedded(&Settings {
         simd: Some(level),
         threads: Some(2),
         ..Settings::default()
     })
+    .expect("a device")
 }
 
 #[gaurast_runner::test(each = simd_levels())]
 fn every_scene_keeps_its_limit(case: &Case) {
     static REFERENCES: ForLevels<Reference> = ForLevels::new();
-    let context = context(case.variant());
+    let gpu = gpu(case.variant());
     let mut failures = Vec::new();
     for stress in all() {
         let reference = REFERENCES.get(stress.name, || {
@@ -64,7 +65,7 @@ fn every_scene_keeps_its_limit(case: &Case) {
             distance: stress.limit,
             ..Limits::ENVELOPE_ONLY
         };
-        let image = draw(&context, &stress);
+        let image = draw(&gpu, &stress);
         let name = format!("{}, {}", stress.name, case.variant());
         assert_sane(&name, &image);
         let judged =
@@ -81,7 +82,7 @@ fn every_scene_keeps_its_limit(case: &Case) {
 #[gaurast_runner::test(each = simd_levels())]
 fn binary16_is_as_defined(case: &Case) {
     static REFERENCES: ForLevels<Reference> = ForLevels::new();
-    let context = context(case.variant());
+    let gpu = gpu(case.variant());
     let mut failures = Vec::new();
     for stress in all() {
         let stress = stress.in_binary16();
@@ -94,7 +95,7 @@ fn binary16_is_as_defined(case: &Case) {
             distance: 0.0,
             ..Limits::ENVELOPE_ONLY
         };
-        let judged = verdict(&draw(&context, &stress), &reference, limits);
+        let judged = verdict(&draw(&gpu, &stress), &reference, limits);
         if !judged.holds() || judged.exhausted > 0 {
             failures.push(format!("{}: {judged}", stress.name));
         }

@@ -3,10 +3,9 @@
 use std::path::Path;
 use std::sync::LazyLock;
 
-use gaurast_tests::contexts::Settings;
-use gaurast_tests::triangles::{Gpu, accurate_lavapipe};
-
-use crate::loader::manifest;
+use gaurast_testkit::Settings;
+use gaurast_testkit::loader::manifest;
+use gaurast_testkit::{Gpu, accurate_lavapipe};
 
 /// The folder where this driver's manifest is while tests run.
 const FOLDER: &str = env!("CARGO_TARGET_TMPDIR");

@@ -5,7 +5,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 use gaurast_runner::{Case, Missing, Need, Variant, ignore, require};
-use gaurast_tests::compare::{Difference, differences, for_people, write_differences};
+use gaurast_testkit::{Difference, differences, for_people, write_differences};
 use gaurast_tests::triangles::models::Model;
 use gaurast_tests::triangles::{Expected, Gpu, Output, Scene, scenes};
 

@@ -9,7 +9,7 @@ use gaurast::vk::{
     PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST as GaussianProperties,
 };
 
-use crate::{During, RenderError};
+use crate::error::{During, RenderError};
 
 /// An instance, which outlives everything made from it.
 struct Instance {

@@ -4,9 +4,10 @@ use ash::vk;
 use gaurast::gaussian_primitive_topology;
 
 use crate::device::Device;
+use crate::device_scene::DeviceScene;
 use crate::pipeline::BINDINGS;
 use crate::resource::{Buffer, Image};
-use crate::{DeviceScene, Target};
+use crate::target::Target;
 use gaurast_scene::Camera;
 use gaurast_scene::camera::Model;
 

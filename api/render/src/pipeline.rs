@@ -10,7 +10,9 @@ use gaurast::vk::{
 };
 
 use crate::device::Device;
-use crate::{DEPTHS_FORMAT, During, RenderError, Settings};
+use crate::error::{During, RenderError};
+use crate::settings::Settings;
+use crate::target::DEPTHS_FORMAT;
 use gaurast_scene::GaussianShape;
 
 /// Vertex buffers: positions, shapes, spherical harmonics.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use crate::device::{CounterDescription, Device};
-use crate::{During, RenderError};
+use crate::error::{During, RenderError};
 
 /// How long to wait for the profiling lock.
 const LOCK_TIMEOUT: u64 = 10_000_000_000;

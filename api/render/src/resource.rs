@@ -7,7 +7,7 @@ use ash::vk;
 use bytemuck::Pod;
 
 use crate::device::Device;
-use crate::{During, RenderError};
+use crate::error::{During, RenderError};
 
 /// Which memory a resource lives in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -298,7 +298,7 @@ fn bounds(mut sample: Vec<(DVec3, f64)>) -> (DVec3, DVec3) {
 mod tests {
     use super::*;
     use crate::camera::DEFAULT_FOV;
-    use crate::scene::GaussianShape;
+    use crate::shape::GaussianShape;
 
     /// A scene of Gaussians of this size at `positions`.
     fn scene(scale: f32, positions: impl IntoIterator<Item = [f32; 3]>) -> Scene {

@@ -4,7 +4,16 @@ use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
 
 use glam::{DMat3, DVec3};
 
-use crate::scene::{MAX_SH_DEGREE, sh_coefficients};
+/// The value of the constant spherical harmonic, 1 / (2 sqrt(pi)).
+pub const SH_C0: f64 = 0.282_094_791_773_878_14;
+
+/// The highest spherical harmonics degree that a [`Scene`](crate::Scene) holds.
+pub const MAX_SH_DEGREE: u32 = 4;
+
+/// The number of coefficients of all degrees up to `degree`.
+pub(crate) fn sh_coefficients(degree: u32) -> usize {
+    (degree as usize + 1).pow(2)
+}
 
 /// The number of basis functions up to [`MAX_SH_DEGREE`].
 const BASIS: usize = (MAX_SH_DEGREE as usize + 1).pow(2);
@@ -156,7 +165,6 @@ pub(crate) fn basis(d: DVec3) -> [f64; BASIS] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::SH_C0;
     use glam::DQuat;
 
     #[test]

@@ -3,7 +3,8 @@
 use serde::Serialize;
 
 use crate::metadata::Metadata;
-use crate::scene::{GaussianShape, Scene};
+use crate::scene::Scene;
+use crate::shape::GaussianShape;
 
 /// Bars of [`Info::opacities`].
 const OPACITY_BARS: usize = 10;

@@ -16,12 +16,15 @@ pub mod info;
 mod metadata;
 pub mod random;
 mod scene;
+mod shape;
 mod transform;
 
 pub use camera::Camera;
 pub use error::{Place, Reason, SceneError};
 pub use formats::{Options, known_extensions, open, open_with, read, read_with};
 pub use framing::{DEFAULT_UP, Extent, Framing, default_angles, frame, inside};
+pub use harmonics::{MAX_SH_DEGREE, SH_C0};
 pub use metadata::{Antialiasing, ColorSpace, Geometry, Metadata, SortOrder};
-pub use scene::{GaussianShape, MAX_SH_DEGREE, SH_C0, Scene, sigmoid};
+pub use scene::Scene;
+pub use shape::{GaussianShape, sigmoid};
 pub use transform::Transform;

@@ -1,35 +1,15 @@
 //! A set of 3D Gaussians, as parallel arrays.
 
-use bytemuck::{Pod, Zeroable};
-
 use rayon::prelude::*;
 
 use crate::error::{Fault, Place, Reason};
+use crate::harmonics::{MAX_SH_DEGREE, sh_coefficients};
 use crate::metadata::{Antialiasing, Geometry, Metadata};
+use crate::shape::GaussianShape;
 use crate::transform::{Motion, Transform};
-
-/// The value of the constant spherical harmonic, 1 / (2 sqrt(pi)).
-pub const SH_C0: f64 = 0.282_094_791_773_878_14;
-
-/// The highest spherical harmonics degree that a [`Scene`] holds.
-pub const MAX_SH_DEGREE: u32 = 4;
 
 /// Gaussians that a thread works on at least.
 const PARALLEL: usize = 1 << 12;
-
-/// What one Gaussian is, apart from its position and its colour: 32 bytes, as a vertex buffer
-/// holds it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-pub struct GaussianShape {
-    /// Standard deviations along the Gaussian's own axes, in the scene's units (not logarithms).
-    pub scale: [f32; 3],
-    /// Rotation from the Gaussian's own axes to the scene's: a quaternion w, x, y, z as the file
-    /// stores it. It need not be normalised; the device does that.
-    pub rotation: [f32; 4],
-    /// Opacity at the centre, 0 to 1 (not a logit).
-    pub opacity: f32,
-}
 
 /// A set of 3D Gaussians, held as parallel arrays ready for upload.
 ///
@@ -281,14 +261,4 @@ impl Scene {
         let stride = self.sh_stride();
         &mut self.sh[index * stride..][..stride]
     }
-}
-
-/// The number of coefficients of all degrees up to `degree`.
-pub(crate) fn sh_coefficients(degree: u32) -> usize {
-    (degree as usize + 1).pow(2)
-}
-
-/// The logistic function, evaluated in binary64 and rounded once.
-pub fn sigmoid(logit: f64) -> f32 {
-    (1.0 / (1.0 + (-logit).exp())) as f32
 }

@@ -3,7 +3,7 @@
 use glam::{DMat3, DQuat, DVec3};
 
 use crate::harmonics::Turn;
-use crate::scene::GaussianShape;
+use crate::shape::GaussianShape;
 
 /// Where a scene is put in another: scaled, then turned, then moved.
 #[derive(Clone, Copy, Debug, PartialEq)]

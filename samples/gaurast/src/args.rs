@@ -1,92 +1,16 @@
-//! The command line.
+//! Arguments that commands share, and those of `gaurast render`.
 
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, ValueEnum};
 use gaurast_picture::{Background, DEFAULT_QUALITY, Size};
 use gaurast_scene::{MAX_SH_DEGREE, Transform};
 use glam::{DQuat, DVec3};
 
-use crate::compare::CompareArguments;
-use crate::compare_drivers::CompareDriversArguments;
-use crate::info::InfoArguments;
-use crate::sheet::ViewsArguments;
-use crate::simulate::SimulateArguments;
-
 /// What every command's help ends with.
-const EXIT_CODES: &str = "Exit codes: 0 done, 1 it failed and one sentence on stderr says why, 2 the command line means \
+pub const EXIT_CODES: &str = "Exit codes: 0 done, 1 it failed and one sentence on stderr says why, 2 the command line means \
     nothing.";
-
-/// Renders scenes of 3D Gaussians on a software Vulkan device with a Gaussian primitive topology.
-///
-/// Without a command, `gaurast` does what `gaurast render` does: `gaurast scene.ply` draws that file, and `gaurast`
-/// alone a generated garden.
-#[derive(Parser)]
-#[command(name = "gaurast", version, max_term_width = 100, after_help = EXIT_CODES)]
-pub struct Arguments {
-    #[command(subcommand)]
-    pub command: Option<Command>,
-}
-
-#[derive(Subcommand)]
-pub enum Command {
-    /// Draws a scene and writes pictures or a video
-    Render(Box<RenderArguments>),
-    /// Draws a scene from eight sides on one labelled sheet, to find its front
-    Views(Box<ViewsArguments>),
-    /// Tells how much two pictures, two folders of pictures, or a picture and a scene differ
-    Compare(Box<CompareArguments>),
-    /// Runs a program on this driver and on another one, and tells how much its pictures differ
-    CompareDrivers(Box<CompareDriversArguments>),
-    /// Tells what a scene holds
-    Info(Box<InfoArguments>),
-    /// Tells what the simulated hardware would have spent on a scene: time, energy, area
-    Simulate(Box<SimulateArguments>),
-    /// Prints a script that completes this command's arguments in a shell
-    #[cfg(feature = "completions")]
-    Completions {
-        /// The shell
-        shell: clap_complete::Shell,
-    },
-    /// Writes manual pages
-    #[cfg(feature = "completions")]
-    Man {
-        /// The folder that they go to
-        folder: PathBuf,
-    },
-}
-
-impl Default for Command {
-    fn default() -> Self {
-        Self::Render(Box::default())
-    }
-}
-
-impl Arguments {
-    /// Reads the command line; what is none ends the process with code 2.
-    pub fn read() -> Self {
-        Self::parse_from(with_command(std::env::args_os().collect()))
-    }
-}
-
-/// The command line with `render` put in where it is meant: before options, and before what is or looks like a file.
-fn with_command(mut words: Vec<std::ffi::OsString>) -> Vec<std::ffi::OsString> {
-    let Some(first) = words.get(1).cloned() else {
-        return words;
-    };
-    let text = first.to_string_lossy();
-    let own = ["-h", "--help", "-V", "--version", "help"].contains(&text.as_ref());
-    let option = text.starts_with('-');
-    let path = std::path::Path::new(&first);
-    let file = path.extension().is_some() || text.contains('/') || path.exists();
-    let command = <Arguments as clap::CommandFactory>::command();
-    let known = command.get_subcommands().any(|c| c.get_name() == text);
-    if !own && !known && (option || file) {
-        words.insert(1, "render".into());
-    }
-    words
-}
 
 #[derive(Args, Default)]
 #[command(after_help = format!("Scenes are read from {} files, as far as there is a reader; in a folder, INRIA's \
@@ -551,55 +475,7 @@ fn field_of_view(text: &str) -> Result<f64, &'static str> {
 
 #[cfg(test)]
 mod tests {
-    use clap::CommandFactory;
-
     use super::*;
-
-    #[test]
-    fn the_command_line_is_consistent() {
-        Arguments::command().debug_assert();
-    }
-
-    #[test]
-    fn no_arguments_are_the_defaults_of_render() {
-        let arguments = Arguments::parse_from(["gaurast", "render"]);
-        let Some(Command::Render(parsed)) = arguments.command else {
-            panic!("not render");
-        };
-        let default = RenderArguments::default();
-        assert_eq!(parsed.output.output, default.output.output);
-        assert_eq!(parsed.camera.view, default.camera.view);
-        assert_eq!(parsed.report.quiet, default.report.quiet);
-        let camera = &parsed.camera;
-        assert!(parsed.scene.scenes.is_empty() && camera.size.is_none() && camera.fov.is_none());
-    }
-
-    #[test]
-    fn a_file_or_an_option_means_render() {
-        let words = |line: &str| {
-            let words = line.split(' ').map(Into::into).collect();
-            let words = with_command(words).into_iter();
-            words
-                .map(|word| word.into_string().expect("text"))
-                .collect::<Vec<_>>()
-                .join(" ")
-        };
-        assert_eq!(words("gaurast"), "gaurast");
-        assert_eq!(words("gaurast a.ply -q"), "gaurast render a.ply -q");
-        assert_eq!(words("gaurast -o a.png"), "gaurast render -o a.png");
-        assert_eq!(words("gaurast some/folder"), "gaurast render some/folder");
-        for own in [
-            "--help",
-            "-V",
-            "help render",
-            "render a.ply",
-            "simulate --paper",
-            "paint",
-        ] {
-            let line = format!("gaurast {own}");
-            assert_eq!(words(&line), line);
-        }
-    }
 
     #[test]
     fn triples() {

@@ -2,6 +2,7 @@
 
 mod args;
 mod cameras;
+mod command_line;
 mod compare;
 mod compare_drivers;
 mod drawing;
@@ -21,7 +22,7 @@ mod sources;
 
 use std::process::ExitCode;
 
-use args::{Arguments, Command};
+use command_line::{Arguments, Command};
 
 /// Why the command failed: a sentence, and the exit code.
 struct Failure {

@@ -1,19 +1,17 @@
 //! An interleaving as packets.
 
-use super::{Area, DepthTest, Interleaving, Picture, SIZE, Step};
+use super::sequence::{Area, DepthTest, Interleaving, Picture, SIZE, Step};
+use crate::gaussian::packets::{attributes, buffer, image, stream, texels};
 use ash::vk;
-use gaurast_tests::scenes::SceneBuffers;
 use gaurast_tests::triangles::edges::to_clip;
 use simdevice::format::{Aspect, ClearValue};
-use simdevice::image::{ImageDesc, ImageKind};
 use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Address, Binding, Format as Word, Program, Rate, Space, Type};
 use simdevice::isa::op::Op;
 use simdevice::packet::{
-    Attachment, AttachmentClear, AttributeStream, BufferCopyRegion, BufferImageRegion, BufferRange,
+    Attachment, AttachmentClear, BufferCopyRegion, BufferImageRegion, BufferRange,
     ClearAttachments, ClearImage, CopyBuffer, CopyBufferImage, GaussianAppend, GaussianAttributes,
-    GaussianBegin, LoadOp, ModelAttributes, Rendering, StoreOp, SubresourceLayers,
-    SubresourceRange,
+    GaussianBegin, LoadOp, Rendering, StoreOp, SubresourceLayers, SubresourceRange,
 };
 use simdevice::packet::{Dispatch, Draw};
 use simdevice::program::bindings::Bindings;
@@ -30,7 +28,7 @@ use simdevice::state::{
     Rect, Topology, Viewport,
 };
 use simdevice::stats::recorder::Recorder;
-use simdevice::{Allocation, CommandProcessor, Config, Device, Format, Image, ImageView, Packet};
+use simdevice::{CommandProcessor, Config, Device, Format, ImageView, Packet};
 use std::sync::Arc;
 
 /// Bytes of a vertex: position and colour.
@@ -128,61 +126,6 @@ fn recolor() -> Program {
     b.finish().expect("a program")
 }
 
-fn buffer<T: bytemuck::NoUninit>(data: &[T]) -> BufferRange {
-    let bytes: &[u8] = bytemuck::cast_slice(data);
-    let memory = Allocation::new_zeroed(bytes.len().max(4) as u64).expect("memory");
-    memory.write(0, bytes).expect("it has room");
-    BufferRange {
-        size: memory.len(),
-        memory,
-        offset: 0,
-    }
-}
-
-fn image(format: Format) -> ImageView {
-    let desc = ImageDesc {
-        kind: ImageKind::D2,
-        format,
-        extent: [SIZE, SIZE, 1],
-        mip_levels: 1,
-        array_layers: 1,
-        samples: 1,
-    };
-    let size = desc.memory_size().expect("a size");
-    let memory = Allocation::new_zeroed(size).expect("memory");
-    ImageView {
-        image: Arc::new(Image::new(desc, memory, 0).expect("an image")),
-        format,
-        base_mip_level: 0,
-        level_count: 1,
-        base_layer: 0,
-        layer_count: 1,
-    }
-}
-
-fn stream(buffer: &BufferRange, stride: u32, offset: u32, format: Format) -> AttributeStream {
-    AttributeStream {
-        buffer: buffer.clone(),
-        stride,
-        offset,
-        format,
-        instance_divisor: None,
-    }
-}
-
-fn attributes(scene: &SceneBuffers) -> GaussianAttributes {
-    let triples = |data: &[[f32; 3]]| stream(&buffer(data), 12, 0, Format::R32G32B32Sfloat);
-    GaussianAttributes {
-        position: triples(&scene.positions),
-        scale: triples(&scene.scales),
-        rotation: stream(&buffer(&scene.rotations), 16, 0, Format::R32G32B32A32Sfloat),
-        opacity: stream(&buffer(&scene.opacities), 4, 0, Format::R32Sfloat),
-        model: ModelAttributes::default(),
-        activations: Default::default(),
-        spherical_harmonics: vec![triples(&scene.sh)],
-    }
-}
-
 const WHOLE: Rect = Rect {
     x: 0,
     y: 0,
@@ -250,8 +193,8 @@ impl Resources {
             })
             .collect();
         Self {
-            color: image(Format::R32G32B32A32Sfloat),
-            depth: image(Format::D32Sfloat),
+            color: image(Format::R32G32B32A32Sfloat, [SIZE; 2], 1),
+            depth: image(Format::D32Sfloat, [SIZE; 2], 1),
             vertices: buffer(vertices.as_flattened()),
             texels: buffer(&vec![0u8; (16 * SIZE * SIZE) as usize]),
             scenes: interleaving.scenes.iter().map(attributes).collect(),
@@ -259,26 +202,10 @@ impl Resources {
     }
 
     fn picture(&self) -> Picture {
-        let read = |view: &ImageView, aspect, bytes: &mut [u8]| {
-            let layout = view.image.subresource(aspect, 0, 0).expect("it has one");
-            let row = bytes.len() / SIZE as usize;
-            for (y, row) in (0..).zip(bytes.chunks_exact_mut(row)) {
-                view.image.read_row(&layout, [0, y, 0], row).expect("a row");
-            }
-        };
-        let pixels = (SIZE * SIZE) as usize;
-        let (mut color, mut depth) = (vec![[0f32; 4]; pixels], vec![0u32; pixels]);
-        read(
-            &self.color,
-            Aspect::Color,
-            bytemuck::cast_slice_mut(&mut color),
-        );
-        read(
-            &self.depth,
-            Aspect::Depth,
-            bytemuck::cast_slice_mut(&mut depth),
-        );
-        Picture { color, depth }
+        Picture {
+            color: texels(&self.color, Aspect::Color),
+            depth: texels(&self.depth, Aspect::Depth),
+        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! An interleaving in binary64: what each pixel may hold after every step.
 
-use super::{Area, DepthTest, Interleaving, Picture, SIZE, Step};
+use super::sequence::{Area, DepthTest, Interleaving, Picture, SIZE, Step};
 use gaurast_tests::oracle::sample_tests::compare;
 use gaurast_tests::oracle::{OracleState, Stored, TestedReference, render_tested};
 use gaurast_tests::triangles::edges::covers;

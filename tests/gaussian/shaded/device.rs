@@ -1,16 +1,16 @@
 //! A device that is driven by packets, whose vertex program writes what it reads.
 
+use crate::gaussian::packets::{attributes, buffer, image, texels};
 use gaurast_tests::compare::{Limits, assert_contract};
 use gaurast_tests::oracle::shaded::{OracleOutputs, OracleViewport, render_shaded};
 use gaurast_tests::oracle::{OracleOrder, OracleState};
 use gaurast_tests::scenes::SceneBuffers;
 use simdevice::format::{Aspect, ClearValue};
-use simdevice::image::{ImageDesc, ImageKind};
 use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Rate, Type};
 use simdevice::packet::{
-    Attachment, AttributeStream, BufferRange, Draw, GaussianAppend, GaussianAttributes,
-    GaussianBegin, GaussianFragmentStage, LoadOp, ModelAttributes, Rendering, StoreOp,
+    Attachment, AttributeStream, Draw, GaussianAppend, GaussianBegin, GaussianFragmentStage,
+    LoadOp, Rendering, StoreOp,
 };
 use simdevice::program::bindings::Bindings;
 use simdevice::program::interface::{DrawPrograms, VertexInput, VertexOutput, gaussian};
@@ -22,7 +22,7 @@ use simdevice::state::{
     Viewport,
 };
 use simdevice::stats::counters::Counters;
-use simdevice::{Allocation, CommandProcessor, Config, Device, Format, Image, ImageView, Packet};
+use simdevice::{CommandProcessor, Config, Device, Format, ImageView, Packet};
 use std::sync::Arc;
 
 /// Neither side is a multiple of a tile's.
@@ -108,25 +108,8 @@ pub fn triangle(device: &Device, samples: u32) -> Draw {
 
 /// All Gaussians of a scene of degree 0, as the device projects them.
 pub fn append(scene: &SceneBuffers) -> GaussianAppend {
-    let stream = |buffer: BufferRange, stride, format| AttributeStream {
-        buffer,
-        stride,
-        offset: 0,
-        format,
-        instance_divisor: None,
-    };
-    let triples = |data: &[[f32; 3]]| stream(buffer(data), 12, Format::R32G32B32Sfloat);
-    let rotations = buffer(&scene.rotations);
     GaussianAppend {
-        attributes: GaussianAttributes {
-            position: triples(&scene.positions),
-            scale: triples(&scene.scales),
-            rotation: stream(rotations, 16, Format::R32G32B32A32Sfloat),
-            opacity: stream(buffer(&scene.opacities), 4, Format::R32Sfloat),
-            spherical_harmonics: vec![triples(&scene.sh)],
-            model: ModelAttributes::default(),
-            activations: Default::default(),
-        },
+        attributes: attributes(scene),
         indices: None,
         first: 0,
         count: scene.positions.len() as u32,
@@ -174,53 +157,6 @@ pub const REPLACE: BlendState = BlendState {
     equations: None,
     write_mask: 0xF,
 };
-
-fn image(format: Format, samples: u32) -> ImageView {
-    let desc = ImageDesc {
-        kind: ImageKind::D2,
-        format,
-        extent: [SIZE[0], SIZE[1], 1],
-        mip_levels: 1,
-        array_layers: 1,
-        samples,
-    };
-    let memory = Allocation::new_zeroed(desc.memory_size().expect("a size")).expect("memory");
-    ImageView {
-        image: Arc::new(Image::new(desc, memory, 0).expect("an image")),
-        format,
-        base_mip_level: 0,
-        level_count: 1,
-        base_layer: 0,
-        layer_count: 1,
-    }
-}
-
-/// The texels of an image.
-fn texels<T: bytemuck::AnyBitPattern + bytemuck::NoUninit>(
-    view: &ImageView,
-    aspect: Aspect,
-) -> Vec<T> {
-    let mut texels = vec![T::zeroed(); (SIZE[0] * SIZE[1]) as usize];
-    let layout = view.image.subresource(aspect, 0, 0).expect("it has one");
-    for (y, row) in (0..).zip(texels.chunks_exact_mut(SIZE[0] as usize)) {
-        let bytes: &mut [u8] = bytemuck::cast_slice_mut(row);
-        view.image
-            .read_row(&layout, [0, y, 0], bytes)
-            .expect("a row");
-    }
-    texels
-}
-
-pub fn buffer<T: bytemuck::NoUninit>(data: &[T]) -> BufferRange {
-    let bytes: &[u8] = bytemuck::cast_slice(data);
-    let memory = Allocation::new_zeroed(bytes.len().max(4) as u64).expect("memory");
-    memory.write(0, bytes).expect("it has room");
-    BufferRange {
-        size: memory.len(),
-        memory,
-        offset: 0,
-    }
-}
 
 /// A set of Gaussians to draw.
 pub struct Case<'a> {
@@ -325,12 +261,12 @@ impl Case<'_> {
 
     /// Draws it over nothing, with depths of one half.
     pub fn run(&self, device: &Arc<Device>) -> Drawn {
-        let color = |_: &BlendState| image(Format::R32G32B32A32Sfloat, self.samples);
+        let color = |_: &BlendState| image(Format::R32G32B32A32Sfloat, SIZE, self.samples);
         let colors: Vec<_> = self.blend.iter().map(color).collect();
         let resolved: Vec<_> = (self.blend.iter())
-            .map(|_| image(Format::R32G32B32A32Sfloat, 1))
+            .map(|_| image(Format::R32G32B32A32Sfloat, SIZE, 1))
             .collect();
-        let depth = image(self.depth_format, self.samples);
+        let depth = image(self.depth_format, SIZE, self.samples);
         let attachment = |view: &ImageView, value| Attachment {
             view: view.clone(),
             load: LoadOp::Clear(value),

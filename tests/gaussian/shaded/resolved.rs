@@ -1,7 +1,7 @@
 //! Resolve shaders: what they read is what the reference says of each pixel, and what they write goes where it should.
 
+use super::cloud::{cloud, level};
 use super::device::{Case, REPLACE, SIZE, UPRIGHT, append, device, triangle, whole};
-use super::{cloud, level};
 use gaurast_runner::simd_levels;
 use gaurast_tests::oracle::resolve::{Resolved, resolve_scene, resolve_shaded};
 use gaurast_tests::oracle::{OracleDepthFormat, OracleState, OracleTests};

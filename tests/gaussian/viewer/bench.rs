@@ -1,6 +1,6 @@
 //! Vertex streams, pipelines and pictures with layers, on a device that has all features.
 //!
-//! `unsafe` has the reason that it has in `gaurast_tests::triangles`.
+//! `unsafe` has the reason that it has in `gaurast_testkit`.
 
 use crate::triangles::devices::own;
 use ash::vk;
@@ -9,9 +9,9 @@ use gaurast::vk::{
     GaussianAttributeLocationsGAURAST, PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST,
     PipelineGaussianApproximationStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
+use gaurast_testkit::shader::{Stage, compile};
+use gaurast_testkit::{Bindings, Buffer, Commands, Gpu, Image, ImageOptions};
 use gaurast_tests::scenes::SceneBuffers;
-use gaurast_tests::triangles::shader::{Stage, compile};
-use gaurast_tests::triangles::{Bindings, Buffer, Commands, Gpu, Image, ImageOptions};
 
 pub type State = PipelineGaussianStateCreateInfoGAURAST<'static>;
 

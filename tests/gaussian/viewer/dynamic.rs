@@ -12,10 +12,10 @@ use gaurast::vk::{
     DYNAMIC_STATE_GAUSSIAN_TRANSMITTANCE_FLOOR_GAURAST, GaussianAntialiasingGAURAST,
     GaussianOrderGAURAST, PipelineGaussianApproximationStateCreateInfoGAURAST,
 };
+use gaurast_testkit::Commands;
 use gaurast_tests::compare::{Limits, assert_contract};
 use gaurast_tests::oracle::{OracleCamera, OracleScene, OracleState, render_bounded};
 use gaurast_tests::scenes;
-use gaurast_tests::triangles::Commands;
 
 type Approximation = PipelineGaussianApproximationStateCreateInfoGAURAST<'static>;
 

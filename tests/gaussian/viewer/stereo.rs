@@ -7,10 +7,10 @@ use gaurast::vk::{
     GaussianCameraDataGAURAST, GaussianCameraGAURAST, GaussianCameraSourceGAURAST,
     GaussianLinearizationGAURAST, GaussianOrderGAURAST,
 };
+use gaurast_testkit::{Bindings, Buffer, Commands, Resource};
 use gaurast_tests::compare::{Limits, assert_contract};
 use gaurast_tests::oracle::{OracleCamera, OracleState, render_bounded};
 use gaurast_tests::scenes::{self, SceneBuffers};
-use gaurast_tests::triangles::{Bindings, Buffer, Commands, Resource};
 
 type Camera = GaussianCameraGAURAST<'static>;
 type Picture = Vec<[f32; 4]>;

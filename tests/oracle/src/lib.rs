@@ -25,6 +25,5 @@
 //! ```
 
 pub mod compare;
-mod convert;
 pub mod oracle;
 pub mod scenes;

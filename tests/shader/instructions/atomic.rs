@@ -1,7 +1,7 @@
 //! Atomic instructions, each invocation on memory of its own: the old value and what it leaves. (What many invocations
 //! do to the same memory is in the driver's tests.)
 
-use super::row;
+use super::rows::row;
 use gaurast_tests::programs::types::{Kind, Ty};
 use gaurast_tests::programs::{Body, Expect, Row};
 use spirv::{Capability, Op};

@@ -1,6 +1,6 @@
 //! Composites and memory: values that move.
 
-use super::row;
+use super::rows::row;
 use gaurast_tests::programs::assembler::Id;
 use gaurast_tests::programs::inputs::Domain;
 use gaurast_tests::programs::types::{Kind, Ty};

@@ -1,7 +1,7 @@
 //! Conversions between types.
 
-use super::What::Core;
-use super::{each, whole};
+use super::rows::What::Core;
+use super::rows::{each, whole};
 use gaurast_tests::programs::inputs::Domain;
 use gaurast_tests::programs::precision::{HALF, exactly};
 use gaurast_tests::programs::types::{Kind, Ty};

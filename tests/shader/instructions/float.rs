@@ -1,7 +1,7 @@
 //! Floating-point arithmetic and comparisons.
 
-use super::What::{Core, Glsl};
-use super::{each, row};
+use super::rows::What::{Core, Glsl};
+use super::rows::{each, row};
 use gaurast_tests::programs::precision::{Interval, exactly, format};
 use gaurast_tests::programs::types::{Kind, Ty};
 use gaurast_tests::programs::{Expect, Row};

@@ -1,8 +1,8 @@
 //! Functions of GLSL.std.450 on floats.
 
-use super::What::Glsl;
 use super::float::{correct, correct_but_sign_of_zero, shape};
-use super::{each, row, whole};
+use super::rows::What::Glsl;
+use super::rows::{each, row, whole};
 use gaurast_tests::programs::inputs::Domain;
 use gaurast_tests::programs::precision::{Format, Interval, Maybe, exactly, format};
 use gaurast_tests::programs::types::{Kind, Ty};

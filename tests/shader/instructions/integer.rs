@@ -1,7 +1,7 @@
 //! Integers, bits and truth values.
 
-use super::What::{Core, Glsl};
-use super::{each, row, whole};
+use super::rows::What::{Core, Glsl};
+use super::rows::{each, row, whole};
 use gaurast_tests::programs::inputs::Domain;
 use gaurast_tests::programs::types::{Kind, Ty};
 use gaurast_tests::programs::{Expect, Row};

@@ -1,7 +1,7 @@
 //! Vectors and matrices.
 
-use super::What::{Core, Glsl};
-use super::{What, whole};
+use super::rows::What::{Core, Glsl};
+use super::rows::{What, whole};
 use gaurast_tests::programs::inputs::Domain;
 use gaurast_tests::programs::precision::{Format, Interval, Maybe, exactly, format};
 use gaurast_tests::programs::types::{Kind, Ty};

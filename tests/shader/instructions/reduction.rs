@@ -1,6 +1,6 @@
 //! Reductions and scans over the invocations of a subgroup.
 
-use super::subgroup::{BOOL, group, scoped, where_true};
+use super::group::{BOOL, group, scoped, where_true};
 use gaurast_tests::programs::inputs::Domain;
 use gaurast_tests::programs::types::{Kind, Ty};
 use gaurast_tests::programs::{Body, Expect, Lane, Row};

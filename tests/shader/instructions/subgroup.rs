@@ -1,60 +1,12 @@
 //! Instructions across the invocations of a subgroup.
 
+use super::group::{BOOL, group, scoped, where_true};
 use super::reduction;
 use ash::vk::SubgroupFeatureFlags as Flags;
 use gaurast_tests::programs::inputs::Domain;
 use gaurast_tests::programs::types::{Kind, Ty};
-use gaurast_tests::programs::{Body, Expect, Lane, Model, Row};
+use gaurast_tests::programs::{Expect, Lane, Row};
 use spirv::{BuiltIn, Capability, GroupOperation, Op};
-
-/// A row whose model sees the whole subgroup. Its instruction names a scope first.
-pub fn group(
-    name: impl Into<String>,
-    operands: &[Ty],
-    result: Ty,
-    emit: impl Fn(&mut Body, &[u32]) -> u32 + 'static,
-    model: impl Fn(&[Lane], usize) -> Vec<Expect> + 'static,
-) -> Row {
-    Row {
-        name: name.into(),
-        operands: operands.iter().map(|ty| (*ty, Domain::Any)).collect(),
-        results: vec![result],
-        emit: Box::new(move |body, v| vec![emit(body, v)]),
-        model: Model::Subgroup(Box::new(model)),
-        flushes: true,
-    }
-}
-
-/// An instruction whose first operand is the scope of a subgroup.
-pub fn scoped(body: &mut Body, op: Op, needs: Capability, ty: Ty, operands: &[u32]) -> u32 {
-    body.asm.capability(Capability::GroupNonUniform);
-    body.asm.capability(needs);
-    let (ty, scope) = (body.ty(ty), body.asm.u32(3));
-    body.asm.emit(op, ty, &[&[scope], operands].concat())
-}
-
-/// What `emit` gives where a condition holds, and zero elsewhere.
-pub fn where_true(
-    body: &mut Body,
-    condition: u32,
-    ty: Ty,
-    emit: impl FnOnce(&mut Body) -> u32,
-) -> u32 {
-    let id = body.ty(ty);
-    let null = body.asm.declare(Op::ConstantNull, Some(id), &[]);
-    let variable = body.asm.local(id);
-    body.asm.act(Op::Store, &[variable, null]);
-    let (inside, after) = (body.asm.id(), body.asm.id());
-    body.asm.act(Op::SelectionMerge, &[after, 0]);
-    body.asm
-        .act(Op::BranchConditional, &[condition, inside, after]);
-    body.asm.label(inside);
-    let value = emit(body);
-    body.asm.act(Op::Store, &[variable, value]);
-    body.asm.act(Op::Branch, &[after]);
-    body.asm.label(after);
-    body.asm.emit(Op::Load, id, &[variable])
-}
 
 /// A group of instructions, which a driver has all of or none: the name, Vulkan's flag, and the rows.
 pub type Group = (&'static str, Flags, fn() -> Vec<Row>);
@@ -80,7 +32,6 @@ pub fn rows() -> Vec<Row> {
     GROUPS.iter().flat_map(|(.., rows)| rows()).collect()
 }
 
-pub const BOOL: Ty = Ty::scalar(Kind::Bool);
 const WORD: Ty = Ty::scalar(Kind::U32);
 const BALLOT: Ty = Ty::vector(Kind::U32, 4);
 

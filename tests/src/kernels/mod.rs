@@ -1,92 +1,15 @@
 //! Real compute kernels, with what the host computes instead: for tests and benchmarks of shader cores.
 
 mod context;
+mod kernel;
 
 pub use context::{Context, Prepared, Refused};
+pub use kernel::{Expected, Kernel, Values};
 
-use ash::vk;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use std::borrow::Cow;
-
-/// A dispatch of a kernel, and what it must leave behind.
-pub struct Kernel {
-    /// Its name.
-    pub name: &'static str,
-    /// Its SPIR-V, as bytes.
-    pub spirv: Cow<'static, [u8]>,
-    /// Values of specialization constants, by id.
-    pub specialization: Vec<(u32, u32)>,
-    /// What the buffers of bindings 0.. hold before.
-    pub buffers: Vec<Vec<u32>>,
-    /// The binding that is a uniform buffer, if one is; the others are storage buffers.
-    pub uniform: Option<u32>,
-    /// Push constants, in words.
-    pub push: Vec<u32>,
-    /// Workgroups in x, y and z.
-    pub groups: [u32; 3],
-    /// What the host computes.
-    pub expected: Vec<Expected>,
-}
-
-/// What a buffer must hold after one dispatch.
-pub struct Expected {
-    /// Its binding.
-    pub binding: usize,
-    /// Its contents.
-    pub values: Values,
-}
-
-/// What words must be.
-pub enum Values {
-    /// These.
-    Exact(Vec<u32>),
-    /// Floats that differ from these by at most the tolerance times their magnitude, or times 1 for smaller ones.
-    Close(Vec<f32>, f32),
-}
-
-impl Kernel {
-    /// What the descriptor of a binding is.
-    pub fn descriptor_type(&self, binding: u32) -> vk::DescriptorType {
-        if self.uniform == Some(binding) {
-            vk::DescriptorType::UNIFORM_BUFFER
-        } else {
-            vk::DescriptorType::STORAGE_BUFFER
-        }
-    }
-}
-
-impl Values {
-    /// The first word that differs: its index, and both values as text.
-    pub fn difference(&self, found: &[u32]) -> Option<(usize, String)> {
-        let differs = |index: usize, wanted: String, found: String| {
-            Some((index, format!("{found} instead of {wanted}")))
-        };
-        match self {
-            Self::Exact(words) => {
-                let index = words
-                    .iter()
-                    .zip(found)
-                    .position(|(wanted, found)| wanted != found)?;
-                differs(index, words[index].to_string(), found[index].to_string())
-            }
-            Self::Close(floats, tolerance) => {
-                let far = |(wanted, found): (&f32, &u32)| {
-                    let error = (f32::from_bits(*found) - wanted).abs();
-                    // A NaN is far from everything.
-                    !matches!(error.partial_cmp(&(tolerance * wanted.abs().max(1.0))), Some(order) if order.is_le())
-                };
-                let index = floats.iter().zip(found).position(far)?;
-                differs(
-                    index,
-                    floats[index].to_string(),
-                    f32::from_bits(found[index]).to_string(),
-                )
-            }
-        }
-    }
-}
 
 /// How much the kernels have to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

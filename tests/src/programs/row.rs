@@ -242,7 +242,7 @@ fn check_module(context: &Context, rows: &[Row]) -> Result<Vec<Failure>, Refused
     };
     let prepared = context.prepare(&kernel)?;
     prepared.run()?;
-    let found = prepared.read(1)?;
+    let found = prepared.read(1);
     let mut at = 0;
     let mut failures = Vec::new();
     for (row, lanes) in rows.iter().zip(&lanes) {

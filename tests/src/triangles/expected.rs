@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use crate::compare::Difference;
+use gaurast_testkit::Difference;
 
 /// A difference that the specification permits.
 #[derive(Clone, Debug, PartialEq)]

@@ -883,7 +883,7 @@ impl GaussianCameraDataGAURAST {
 }
 
 /// The type of `vkCmdSetGaussianCamerasGAURAST`.
-#[allow(non_camel_case_types)]
+#[allow(non_camel_case_types, reason = "the name is Vulkan's")]
 pub type PFN_vkCmdSetGaussianCamerasGAURAST = unsafe extern "system" fn(
     command_buffer: vk::CommandBuffer,
     camera_count: u32,
@@ -891,64 +891,64 @@ pub type PFN_vkCmdSetGaussianCamerasGAURAST = unsafe extern "system" fn(
 );
 
 /// The type of `vkCmdBeginGaussianSetGAURAST`.
-#[allow(non_camel_case_types)]
+#[allow(non_camel_case_types, reason = "the name is Vulkan's")]
 pub type PFN_vkCmdBeginGaussianSetGAURAST =
     unsafe extern "system" fn(command_buffer: vk::CommandBuffer);
 
 /// The type of `vkCmdEndGaussianSetGAURAST`.
-#[allow(non_camel_case_types)]
+#[allow(non_camel_case_types, reason = "the name is Vulkan's")]
 pub type PFN_vkCmdEndGaussianSetGAURAST =
     unsafe extern "system" fn(command_buffer: vk::CommandBuffer);
 
 /// The type of `vkCmdSetGaussianOrderGAURAST`.
-#[allow(non_camel_case_types)]
+#[allow(non_camel_case_types, reason = "the name is Vulkan's")]
 pub type PFN_vkCmdSetGaussianOrderGAURAST =
     unsafe extern "system" fn(command_buffer: vk::CommandBuffer, order: GaussianOrderGAURAST);
 
 /// The type of `vkCmdSetGaussianAntialiasingGAURAST`.
-#[allow(non_camel_case_types)]
+#[allow(non_camel_case_types, reason = "the name is Vulkan's")]
 pub type PFN_vkCmdSetGaussianAntialiasingGAURAST = unsafe extern "system" fn(
     command_buffer: vk::CommandBuffer,
     antialiasing: GaussianAntialiasingGAURAST,
 );
 
 /// The type of `vkCmdSetGaussianLowPassVarianceGAURAST`.
-#[allow(non_camel_case_types)]
+#[allow(non_camel_case_types, reason = "the name is Vulkan's")]
 pub type PFN_vkCmdSetGaussianLowPassVarianceGAURAST =
     unsafe extern "system" fn(command_buffer: vk::CommandBuffer, low_pass_variance: f32);
 
 /// The type of `vkCmdSetGaussianAlphaFloorGAURAST`.
-#[allow(non_camel_case_types)]
+#[allow(non_camel_case_types, reason = "the name is Vulkan's")]
 pub type PFN_vkCmdSetGaussianAlphaFloorGAURAST =
     unsafe extern "system" fn(command_buffer: vk::CommandBuffer, alpha_floor: f32);
 
 /// The type of `vkCmdSetGaussianAlphaCeilingGAURAST`.
-#[allow(non_camel_case_types)]
+#[allow(non_camel_case_types, reason = "the name is Vulkan's")]
 pub type PFN_vkCmdSetGaussianAlphaCeilingGAURAST =
     unsafe extern "system" fn(command_buffer: vk::CommandBuffer, alpha_ceiling: f32);
 
 /// The type of `vkCmdSetGaussianTransmittanceFloorGAURAST`.
-#[allow(non_camel_case_types)]
+#[allow(non_camel_case_types, reason = "the name is Vulkan's")]
 pub type PFN_vkCmdSetGaussianTransmittanceFloorGAURAST =
     unsafe extern "system" fn(command_buffer: vk::CommandBuffer, transmittance_floor: f32);
 
 /// The type of `vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST`.
-#[allow(non_camel_case_types)]
+#[allow(non_camel_case_types, reason = "the name is Vulkan's")]
 pub type PFN_vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST =
     unsafe extern "system" fn(command_buffer: vk::CommandBuffer, spherical_harmonics_degree: u32);
 
 /// The type of `vkCmdSetGaussianExponentialErrorGAURAST`.
-#[allow(non_camel_case_types)]
+#[allow(non_camel_case_types, reason = "the name is Vulkan's")]
 pub type PFN_vkCmdSetGaussianExponentialErrorGAURAST =
     unsafe extern "system" fn(command_buffer: vk::CommandBuffer, exponential_error: f32);
 
 /// The type of `vkCmdSetGaussianContributionBudgetGAURAST`.
-#[allow(non_camel_case_types)]
+#[allow(non_camel_case_types, reason = "the name is Vulkan's")]
 pub type PFN_vkCmdSetGaussianContributionBudgetGAURAST =
     unsafe extern "system" fn(command_buffer: vk::CommandBuffer, contribution_budget: f32);
 
 /// The type of `vkCmdBindGaussianSphericalHarmonicsGAURAST`.
-#[allow(non_camel_case_types)]
+#[allow(non_camel_case_types, reason = "the name is Vulkan's")]
 pub type PFN_vkCmdBindGaussianSphericalHarmonicsGAURAST = unsafe extern "system" fn(
     command_buffer: vk::CommandBuffer,
     p_buffer: *const GaussianSphericalHarmonicsBufferGAURAST<'_>,

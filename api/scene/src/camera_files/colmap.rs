@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DQuat, DVec3};
 
-use super::{CameraFile, CameraFileError, CameraFileOptions, Distortion, Numbers, View, ViewError};
+use super::view::{
+    CameraFile, CameraFileError, CameraFileOptions, Distortion, Numbers, View, ViewError,
+};
 use crate::camera::Model;
 
 /// COLMAP's camera models, by number: the name, and how many parameters it has.

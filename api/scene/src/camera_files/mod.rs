@@ -3,124 +3,17 @@
 
 mod colmap;
 mod nerfstudio;
+mod view;
 
-use std::path::{Path, PathBuf};
-use std::{fs, io};
+use std::fs;
+use std::path::Path;
 
 use serde::Deserialize;
-use thiserror::Error;
 
-use crate::camera::{Camera, DEFAULT_NEAR, Model};
+use crate::camera::Model;
 use nerfstudio::{CameraPath, Dataparser, Transforms};
-
-/// The most pixels along an axis that a camera file may claim.
-const MAX_SIZE: f64 = 1e6;
-
-/// How far a rotation's rows may be from orthonormal.
-const TOLERANCE: f64 = 1e-3;
-
-/// A camera of a file.
-#[derive(Clone, Debug)]
-pub struct View {
-    /// The photograph's name, or empty.
-    pub name: String,
-    /// The camera, with the photograph's size.
-    pub camera: Camera,
-}
-
-/// Why a camera file could not be read. Displayed as one sentence: file, place, reason.
-#[derive(Debug, Error)]
-pub enum CameraFileError {
-    /// The file cannot be opened or read.
-    #[error("{}: {source}", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        source: io::Error,
-    },
-    /// The file is not JSON, or not of this shape.
-    #[error("{}: {source}", path.display())]
-    Json {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong, with line and column.
-        source: serde_json::Error,
-    },
-    /// The file is of none of the kinds.
-    #[error(
-        "{}: this is neither a cameras.json (a list) nor a transforms.json (with frames), a camera_path.json or COLMAP's",
-        path.display()
-    )]
-    UnknownKind {
-        /// The file.
-        path: PathBuf,
-    },
-    /// A binary or text file of COLMAP is damaged.
-    #[error("{}: {reason}", path.display())]
-    Colmap {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        reason: String,
-    },
-    /// A camera's numbers are not a camera.
-    #[error("{}: view {view}: {reason}", path.display())]
-    View {
-        /// The file.
-        path: PathBuf,
-        /// The camera's index in the file, from 0.
-        view: usize,
-        /// What is wrong with it.
-        reason: ViewError,
-    },
-}
-
-/// What is wrong with a camera of a file.
-#[derive(Clone, Debug, Error, PartialEq, Eq)]
-pub enum ViewError {
-    /// The image size is not positive and reasonable.
-    #[error("the image size is not positive whole numbers of pixels")]
-    Size,
-    /// A focal length is absent or not positive.
-    #[error("the focal length is missing, not positive, or beyond binary32")]
-    Focal,
-    /// A position or a principal point is not finite, or beyond binary32.
-    #[error("a number is not finite, or beyond binary32")]
-    NotFinite,
-    /// The lens distorts.
-    #[error(
-        "the lens distorts ({0}), which is drawn only as an ideal lens would see it (--undistorted)"
-    )]
-    Distorted(String),
-    /// The rotation is not one.
-    #[error("the rotation's rows are not perpendicular unit vectors")]
-    Rotation,
-    /// A model other than pinhole.
-    #[error("camera model {0} is not read")]
-    Model(String),
-}
-
-/// What a camera file leaves to whoever reads it.
-#[derive(Clone, Debug)]
-pub struct CameraFileOptions {
-    /// The image size where a transforms.json doesn't give one.
-    pub size: [u32; 2],
-    /// nerfstudio's dataparser_transforms.json, which lies beside a trained model: it takes the cameras of a
-    /// transforms.json to where the model is.
-    pub dataparser: Option<PathBuf>,
-    /// Cameras whose lens distorts are those of an ideal lens.
-    pub undistorted: bool,
-}
-
-/// The cameras of a file.
-#[derive(Clone, Debug, Default)]
-pub struct CameraFile {
-    /// The cameras, in the file's order; COLMAP's in the order of their names.
-    pub views: Vec<View>,
-    /// What the file says and nothing heeds, a sentence each.
-    pub ignored: Vec<String>,
-}
+use view::Numbers;
+pub use view::{CameraFile, CameraFileError, CameraFileOptions, View, ViewError};
 
 /// Reads all cameras of the file at `path`. `size` stands in for an image size that a
 /// transforms.json doesn't give.
@@ -222,37 +115,6 @@ fn parse(
     Ok(CameraFile { views, ignored })
 }
 
-/// What a lens does to the picture of a perfect one: OpenCV's radial and tangential coefficients.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Distortion {
-    radial: [f64; 4],
-    tangential: [f64; 2],
-}
-
-impl Distortion {
-    /// Checks that there is none, or that it may be left out, which `ignored` is then told.
-    fn check(self, undistorted: bool, ignored: &mut Vec<String>) -> Result<(), ViewError> {
-        let names = ["k1", "k2", "k3", "k4", "p1", "p2"];
-        let values = self.radial.iter().chain(&self.tangential);
-        let coefficients: Vec<String> = (names.iter().zip(values))
-            .filter(|(_, value)| **value != 0.0)
-            .map(|(name, value)| format!("{name} = {value}"))
-            .collect();
-        if coefficients.is_empty() {
-            return Ok(());
-        }
-        let coefficients = coefficients.join(", ");
-        if !undistorted {
-            return Err(ViewError::Distorted(coefficients));
-        }
-        let note = format!("the lens's distortion ({coefficients}) is left out");
-        if !ignored.contains(&note) {
-            ignored.push(note);
-        }
-        Ok(())
-    }
-}
-
 /// One entry of cameras.json. The rotation is camera to world: its columns are the directions
 /// right, down and forward.
 #[derive(Deserialize)]
@@ -283,72 +145,6 @@ impl InriaCamera {
         Ok(View {
             name: self.img_name,
             camera,
-        })
-    }
-}
-
-/// The numbers of a camera, before they are checked.
-struct Numbers {
-    model: Model,
-    /// World to camera.
-    rotation: [[f64; 3]; 3],
-    eye: [f64; 3],
-    focal: [f64; 2],
-    principal: [f64; 2],
-    size: [f64; 2],
-}
-
-impl Numbers {
-    /// The camera.
-    fn camera(self) -> Result<Camera, ViewError> {
-        let Self {
-            model,
-            rotation,
-            eye,
-            focal,
-            principal,
-            size,
-        } = self;
-        if !size
-            .iter()
-            .all(|s| (1.0..=MAX_SIZE).contains(s) && s.fract() == 0.0)
-        {
-            return Err(ViewError::Size);
-        }
-        if !focal
-            .iter()
-            .all(|f| (*f as f32) > 0.0 && (*f as f32).is_finite())
-        {
-            return Err(ViewError::Focal);
-        }
-        let finite =
-            eye.iter().all(|x| x.is_finite()) && principal.iter().all(|x| (*x as f32).is_finite());
-        if !finite {
-            return Err(ViewError::NotFinite);
-        }
-        let orthonormal = (0..3).all(|i| {
-            (0..3).all(|j| {
-                let dot: f64 = rotation[i]
-                    .iter()
-                    .zip(rotation[j])
-                    .map(|(a, b)| a * b)
-                    .sum();
-                (dot - f64::from(u8::from(i == j))).abs() <= TOLERANCE
-            })
-        });
-        if !orthonormal {
-            return Err(ViewError::Rotation);
-        }
-        Ok(Camera {
-            model,
-            rotation,
-            eye,
-            focal,
-            principal,
-            width: size[0] as u32,
-            height: size[1] as u32,
-            near: DEFAULT_NEAR,
-            far: f64::INFINITY,
         })
     }
 }

@@ -3,7 +3,7 @@
 use glam::{DMat3, DMat4, DVec3};
 use serde::Deserialize;
 
-use super::{CameraFileOptions, Distortion, Numbers, View, ViewError};
+use super::view::{CameraFileOptions, Distortion, Numbers, View, ViewError};
 use crate::camera::Model;
 
 /// A transforms.json, or anything with braces around it.

@@ -5,7 +5,6 @@ use std::path::{Component, Path};
 
 use flate2::bufread::GzDecoder;
 
-use super::Options;
 use crate::error::{Fault, Place, Reason};
 use crate::scene::Scene;
 
@@ -14,6 +13,13 @@ pub(super) const MAX_EXPANSION: u64 = 1032;
 
 /// The first bytes of a gzip stream.
 pub(super) const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
+
+/// What a caller asks of a reader.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Options {
+    /// The level of detail of a scene that has several (streamed SOG): 0 is the finest.
+    pub level: u32,
+}
 
 /// A format of scene files.
 pub(super) trait Format: Sync {

@@ -10,7 +10,9 @@ use half::f16;
 
 use super::input::{Format, Input};
 use crate::error::{Fault, Place, Reason};
-use crate::scene::{GaussianShape, SH_C0, Scene, sh_coefficients};
+use crate::harmonics::{SH_C0, sh_coefficients};
+use crate::scene::Scene;
+use crate::shape::GaussianShape;
 
 /// The format.
 pub(super) struct KSplat;

@@ -14,17 +14,11 @@ use std::path::{Path, PathBuf};
 
 use crate::error::{Fault, Place, Reason, SceneError};
 use crate::scene::Scene;
+pub use input::Options;
 use input::{Format, Input, Origin};
 
 /// The path that stands for standard input.
 const STANDARD_INPUT: &str = "-";
-
-/// What a caller asks of a reader.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Options {
-    /// The level of detail of a scene that has several (streamed SOG): 0 is the finest.
-    pub level: u32,
-}
 
 /// Reads the scene file at `path`, or the one in the folder `path`, or standard input if it is `-`.
 ///

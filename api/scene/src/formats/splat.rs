@@ -6,7 +6,9 @@
 
 use super::input::{Format, Input};
 use crate::error::{Fault, Place, Reason};
-use crate::scene::{GaussianShape, SH_C0, Scene};
+use crate::harmonics::SH_C0;
+use crate::scene::Scene;
+use crate::shape::GaussianShape;
 
 /// The format.
 pub(super) struct Splat;

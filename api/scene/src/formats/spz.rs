@@ -14,8 +14,10 @@ use ruzstd::decoding::StreamingDecoder;
 
 use super::input::{Format, Input, read_growing};
 use crate::error::{Fault, Place, Reason};
+use crate::harmonics::{MAX_SH_DEGREE, sh_coefficients};
 use crate::metadata::{Antialiasing, Metadata};
-use crate::scene::{GaussianShape, MAX_SH_DEGREE, Scene, sh_coefficients};
+use crate::scene::Scene;
+use crate::shape::GaussianShape;
 use crate::transform::Motion;
 
 /// The format.

@@ -5,8 +5,10 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::light;
+use crate::harmonics::SH_C0;
 use crate::random::normal;
-use crate::scene::{GaussianShape, SH_C0, Scene};
+use crate::scene::Scene;
+use crate::shape::GaussianShape;
 
 /// One Gaussian before it is in a scene.
 pub(super) struct Splat {

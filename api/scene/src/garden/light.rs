@@ -102,7 +102,7 @@ mod tests {
         let count = 20_000;
         let mut products = [[0.0; 16]; 16];
         for i in 0..count {
-            let values = basis(super::super::spread(i, count));
+            let values = basis(super::super::directions::spread(i, count));
             for (row, a) in products.iter_mut().zip(values) {
                 for (sum, b) in row.iter_mut().zip(values) {
                     *sum += a * b * 4.0 * PI / count as f64;
@@ -131,7 +131,7 @@ mod tests {
         };
         assert!((towards(axis) - LOBE.iter().sum::<f64>()).abs() < 1e-9);
         let brightest = (0..500)
-            .map(|i| super::super::spread(i, 500))
+            .map(|i| super::super::directions::spread(i, 500))
             .max_by(|a, b| towards(*a).total_cmp(&towards(*b)));
         assert!(brightest.expect("there are directions").dot(axis) > 0.98);
     }

@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use glam::DVec3;
 
 use super::brush::{Brush, Splat};
+use super::directions::{facing, spread};
 use super::light::{leaf, matte, mirror, sky as sky_colour, smooth, sun};
-use super::{facing, spread};
 
 /// The pond's radius; its centre is the origin, its water the height 0.
 const POND: f64 = 1.75;

@@ -90,7 +90,7 @@ pub(super) fn definitions(
         let _ = writeln!(
             code,
             "/// The type of `{0}`.
-            #[allow(non_camel_case_types)]
+            #[allow(non_camel_case_types, reason = \"the name is Vulkan's\")]
             pub type PFN_{0} = unsafe extern \"system\" fn({parameters});\n",
             command.name
         );

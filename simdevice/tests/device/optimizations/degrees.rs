@@ -1,7 +1,10 @@
 //! Chunks that draws of the same Gaussians by several degrees of spherical harmonics share.
 
-use super::unchanged::with_bands_of_zeros;
-use super::*;
+use super::drawing::{draw_as_without_skips, with_bands_of_zeros};
+use crate::common::single;
+use simdevice::stats::counters::Counter;
+use simdevice::{CommandProcessor, Config, Device, Packet};
+use std::sync::Arc;
 
 /// Draws Gaussians, which have coefficients up to degree 2, by each of these degrees in turn; says in which pictures chunks
 /// were made. Every picture is that of a device without optimizations.

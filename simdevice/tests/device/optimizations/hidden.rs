@@ -1,28 +1,14 @@
 //! What others hide.
 
-use super::*;
-
-/// Gaussians that only the device can write, the first of which are a wall before the others: large, opaque, and at most
-/// `right` of the middle.
-pub fn walled(seed: u64, right: f32, opacity: f32) -> Vec<Packet> {
-    const FLOATS: u64 = 14;
-    let packets = gaussians_in(false, seed, 12_000, OVER);
-    let Packet::GaussianAppend(append) = &packets[1] else {
-        panic!("what follows the beginning of a set");
-    };
-    let memory = &append.attributes.position.buffer.memory;
-    shrink(&packets[1]);
-    for vertex in 0..600u64 {
-        let (column, row) = (vertex % 30, vertex / 30);
-        let x = -1.3 + (1.3 + right) * column as f32 / 29.0;
-        let y = -1.0 + 0.1 * row as f32;
-        let z = 1.2 + 0.0005 * ((vertex * 37) % 600) as f32;
-        let at = 4 * FLOATS * vertex;
-        memory.write(at, &[x, y, z, 0.3, 0.25, 0.35]).unwrap();
-        memory.write(at + 40, &[opacity]).unwrap();
-    }
-    packets
-}
+use super::drawing::{Change, draw, walled};
+use simdevice::Packet;
+use simdevice::format::ClearValue;
+use simdevice::packet::LoadOp;
+use simdevice::state::gaussian::{CameraModel, GaussianLinearization};
+use simdevice::state::{CompareOp, DepthTest, Rect};
+use simdevice::stats::counters::{Counter, Counters};
+use simdevice::stats::optimizations::{Optimization, Optimizations};
+use std::sync::Arc;
 
 #[gaurast_runner::test]
 fn what_is_hidden_changes_no_bit() {

@@ -1,8 +1,19 @@
 //! What is drawn again as it was is not projected again, and whatever changes is seen.
 
-use super::*;
+use super::drawing::{draw_as_without_skips, programs};
+use crate::common::{OVER, attachment, gaussians_in, image, rendering, single};
+use simdevice::format::ClearValue;
+use simdevice::packet::{
+    AttributeStream, BufferRange, GaussianAppend, GaussianBegin, GaussianFragmentStage, LoadOp,
+};
+use simdevice::program::bindings::Bindings;
 use simdevice::program::fragment::GaussianFragmentProgram;
 use simdevice::program::interface::resolve;
+use simdevice::program::interface::{FragmentInput, FragmentPrograms, Interpolation, Sampling};
+use simdevice::state::gaussian::{GaussianGeometry, GaussianOrder, GaussianState};
+use simdevice::stats::counters::Counter;
+use simdevice::{Allocation, CommandProcessor, Device, Format, Packet};
+use std::sync::Arc;
 
 /// What changes packets before they are drawn again.
 pub(super) type Edit = Box<dyn FnMut(&mut [Packet])>;
@@ -159,55 +170,6 @@ fn placed_in_the_device() -> Vec<Packet> {
     if let Packet::GaussianAppend(append) = &mut packets[1] {
         append.instance_count = 2;
         append.attributes.model.matrix = Some(Box::new([stream(0), stream(1), stream(2)]));
-    }
-    packets
-}
-
-/// Gaussians with coefficients of three degrees, of which the second and the third are zero in parts of space.
-pub(super) fn with_bands_of_zeros() -> Vec<Packet> {
-    let mut packets = gaussians_in(false, 44, 4000, OVER);
-    let Packet::GaussianAppend(append) = &mut packets[1] else {
-        panic!("what follows the beginning of a set");
-    };
-    const FLOATS: u32 = 27;
-    let size = 4 * u64::from(FLOATS * append.count);
-    let memory = Allocation::new(size, false).unwrap();
-    for vertex in 0..append.count {
-        let position = &append.attributes.position;
-        let at = u64::from(vertex * position.stride + position.offset);
-        let mut place = [0.0f32; 3];
-        position.buffer.memory.read(at, &mut place).unwrap();
-        let degree = if place[0] > 0.5 {
-            2
-        } else if place[1] > 0.0 {
-            1
-        } else {
-            0
-        };
-        let mut coefficients = [0.0f32; FLOATS as usize];
-        for (k, value) in coefficients.iter_mut().enumerate() {
-            if k < 3 * (degree + 1) * (degree + 1) {
-                *value = ((vertex as usize * 31 + k * 17) % 23) as f32 * 0.04 - 0.3;
-            }
-        }
-        let at = u64::from(4 * FLOATS * vertex);
-        memory.write(at, &coefficients).unwrap();
-    }
-    append.attributes.spherical_harmonics = (0..9)
-        .map(|k| AttributeStream {
-            buffer: BufferRange {
-                memory: memory.clone(),
-                offset: 0,
-                size,
-            },
-            stride: 4 * FLOATS,
-            offset: 12 * k,
-            format: Format::R32G32B32Sfloat,
-            instance_divisor: None,
-        })
-        .collect();
-    if let Packet::GaussianBegin(begin) = &mut packets[0] {
-        Arc::make_mut(&mut begin.state).sh_degree = 2;
     }
     packets
 }

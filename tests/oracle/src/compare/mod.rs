@@ -8,6 +8,7 @@
 //!
 //! Images are slices of premultiplied red, green, blue and alpha, row by row from the top.
 
+mod distance;
 mod picture;
 mod verdict;
 

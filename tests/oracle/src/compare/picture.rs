@@ -5,7 +5,7 @@ use std::path::Path;
 use image::{Rgb, RgbImage};
 use thiserror::Error;
 
-use super::verdict::{distance_between, distance_from_envelope, took_other_branch};
+use super::distance::{distance_between, distance_from_envelope, took_other_branch};
 use crate::oracle::Reference;
 
 /// Why a picture could not be written.

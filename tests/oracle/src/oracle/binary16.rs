@@ -9,7 +9,8 @@ use half::f16;
 use rayon::prelude::*;
 
 use super::panorama;
-use super::project::{Splat, project};
+use super::project::project;
+use super::splat::Splat;
 use super::{
     OracleCamera, OracleGeometry, OracleOrder, OracleScene, OracleState, Reference, SkipCounts,
 };

@@ -1,6 +1,7 @@
 //! Model matrices.
 
-use super::{OracleInstance, OracleScene};
+use super::inputs::OracleInstance;
+use super::vectors::dot;
 
 /// What an instance is to the projection, in binary64.
 pub struct Model {
@@ -8,18 +9,6 @@ pub struct Model {
     pub linear: [[f64; 3]; 3],
     /// Its fourth column.
     pub translation: [f64; 3],
-}
-
-impl OracleScene<'_> {
-    /// What places Gaussian `index` in the world.
-    pub(super) fn instance(&self, index: usize) -> OracleInstance {
-        self.instances.get(index).copied().unwrap_or_default()
-    }
-
-    /// The opacity of Gaussian `index`, rounded to binary32 once.
-    pub(super) fn opacity(&self, index: usize) -> f32 {
-        self.opacities[index] * self.instance(index).opacity
-    }
 }
 
 impl Model {
@@ -73,10 +62,6 @@ impl Model {
 fn determinant3(a: &[[f64; 3]; 3]) -> f64 {
     let minor = |i: usize, j: usize| a[1][i] * a[2][j] - a[1][j] * a[2][i];
     a[0][0] * minor(1, 2) - a[0][1] * minor(0, 2) + a[0][2] * minor(0, 1)
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 #[test]

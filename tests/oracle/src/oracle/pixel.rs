@@ -1,67 +1,13 @@
-//! Steps 6 and 7: alpha at a pixel centre, and compositing front to back, both ways where a
+//! Step 7: compositing front to back, both ways where a
 //! decision cannot be demanded of binary32.
 
 use super::OracleState;
 use super::error_model::{Transmittance, UNIT_ROUNDOFF};
-use super::panorama;
-use super::project::Splat;
+use super::splat::{Alpha, Splat};
 
 /// How many undecidable decisions are followed both ways along one path; later ones follow
 /// binary64.
 pub const MAX_DECISIONS: u32 = 6;
-
-/// Alpha of a Gaussian at a pixel.
-#[derive(Clone, Copy, Debug)]
-pub struct Alpha {
-    /// Step 6's value, ceiling applied.
-    pub value: f64,
-    /// How far a binary32 implementation may be from it.
-    pub error: f64,
-}
-
-impl Alpha {
-    const NOTHING: Self = Self {
-        value: 0.0,
-        error: 0.0,
-    };
-}
-
-impl Splat {
-    /// Step 6 at the centre of pixel (x, y).
-    pub fn alpha(&self, x: u32, y: u32, state: &OracleState) -> Alpha {
-        let dx = f64::from(x) + 0.5 - self.mean[0];
-        let Some(dx) = panorama::nearest(dx, self.period) else {
-            return Alpha::NOTHING;
-        };
-        let d = [dx, f64::from(y) + 0.5 - self.mean[1]];
-        let (q, relative) = match &self.surfel {
-            Some(surfel) => surfel.distance([f64::from(x) + 0.5, f64::from(y) + 0.5]),
-            None => {
-                let (q, w) = self.cholesky.solve(d);
-                (q, self.error.alpha(w, q))
-            }
-        };
-        let unclamped = self.opacity * (-0.5 * q).exp();
-        let error = unclamped * relative;
-        let ceiling = f64::from(state.alpha_ceiling);
-        if unclamped - error > ceiling {
-            Alpha {
-                value: ceiling,
-                error: 0.0,
-            }
-        } else if unclamped > ceiling {
-            Alpha {
-                value: ceiling,
-                error,
-            }
-        } else {
-            Alpha {
-                value: unclamped,
-                error,
-            }
-        }
-    }
-}
 
 /// Depth variables, one of which is a pixel's median.
 #[derive(Clone, Copy, Debug, Default)]

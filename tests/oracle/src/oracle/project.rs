@@ -2,86 +2,17 @@
 
 use super::error_model::{self, ErrorModel};
 use super::instance::Model;
+use super::own_axes::OwnAxes;
 use super::panorama;
-use super::rays::OwnAxes;
+use super::projection::{depth_variable, mean_and_jacobian};
 use super::spherical_harmonics;
+use super::splat::{Cholesky, Splat};
 use super::surfel::Surfel;
 use super::unscented;
+use super::vectors::{dot, length, multiply_row, subtract, transform};
 use super::{
-    OracleCamera, OracleGeometry, OracleInstance, OracleModel, OracleOrder, OracleScene,
-    OracleState, SkipReason,
+    OracleCamera, OracleGeometry, OracleInstance, OracleOrder, OracleScene, OracleState, SkipReason,
 };
-
-/// A Gaussian as the pixels see it.
-#[derive(Clone, Copy, Debug)]
-pub struct Splat {
-    /// Centre in pixels from the viewport's upper left corner, not clamped to it.
-    pub mean: [f64; 2],
-    /// Covariance `xx, xy, yy` in px^2, low-pass filter included.
-    pub covariance: [f64; 3],
-    /// Its determinant, evaluated without cancellation.
-    pub determinant: f64,
-    /// After how many pixels the picture repeats to the right and to the left, or infinity.
-    pub period: f64,
-    /// The factor with which the quadratic form is evaluated.
-    pub cholesky: Cholesky,
-    /// Opacity, compensated if the state says so.
-    pub opacity: f64,
-    /// Colour, at least 0.
-    pub color: [f64; 3],
-    /// What it is sorted by, rounded to binary32.
-    pub key: f32,
-    /// The depth variable, rounded to binary32. (With vertex-shader projection the depth, rounded so.)
-    pub z: f32,
-    /// The depth of its centre, of which a pixel has a mean; zero until somebody asks for that.
-    pub depth: f64,
-    /// What it is in space, if that is a disc.
-    pub surfel: Option<Surfel>,
-    /// What its depth along rays comes from.
-    pub own_axes: OwnAxes,
-    /// Whether the key is within its own error of the middle between two keys.
-    pub key_undecidable: bool,
-    /// How far a binary32 implementation may err on this Gaussian.
-    pub error: ErrorModel,
-}
-
-/// Lower triangular factor of a 2x2 covariance, pivoted on its larger diagonal element.
-#[derive(Clone, Copy, Debug)]
-pub struct Cholesky {
-    /// Whether y comes first.
-    pub swapped: bool,
-    /// The factor's elements `l11, l21, l22`.
-    pub l: [f64; 3],
-}
-
-impl Cholesky {
-    /// Factors `[xx, xy, yy]`. The last pivot comes from the determinant, not from a difference.
-    pub(super) fn new([xx, xy, yy]: [f64; 3], determinant: f64) -> Self {
-        let swapped = yy > xx;
-        let larger = if swapped { yy } else { xx };
-        let l11 = larger.sqrt();
-        Self {
-            swapped,
-            l: [l11, xy / l11, (determinant / larger).sqrt()],
-        }
-    }
-
-    /// `q = d^T S^-1 d` as a sum of two squares, and `w = S^-1 d`.
-    pub fn solve(&self, d: [f64; 2]) -> (f64, [f64; 2]) {
-        let [l11, l21, l22] = self.l;
-        let (first, second) = if self.swapped {
-            (d[1], d[0])
-        } else {
-            (d[0], d[1])
-        };
-        let y1 = first / l11;
-        let y2 = (second - l21 * y1) / l22;
-        let w2 = y2 / l22;
-        let w1 = (y1 - l21 * w2) / l11;
-        let w = if self.swapped { [w2, w1] } else { [w1, w2] };
-        (y1 * y1 + y2 * y2, w)
-    }
-}
 
 /// Projects Gaussian `index`, or says why it is not drawn.
 pub fn project(
@@ -298,118 +229,4 @@ fn key_is_undecidable(rotation: &[f64; 9], offset: [f64; 3], lost: f64, sort_by:
         + 2.5 * f64::EPSILON * length([0, 1, 2].map(magnitude))
         + 2.0 * f64::EPSILON * sort_by.abs();
     (sort_by - error) as f32 != (sort_by + error) as f32
-}
-
-/// The mean of a camera's picture of a point in camera axes, and the Jacobian there.
-pub(super) fn mean_and_jacobian(camera: &OracleCamera, t: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
-    match camera.model {
-        OracleModel::Pinhole => pinhole(camera, t),
-        OracleModel::Orthographic => orthographic(camera, t),
-        OracleModel::Fisheye => fisheye(camera, t),
-        OracleModel::Equirectangular => panorama::equirectangular(camera, t),
-    }
-}
-
-/// The depth variable of a point in camera axes.
-fn depth_variable(model: OracleModel, t: [f64; 3]) -> f64 {
-    match model {
-        OracleModel::Pinhole | OracleModel::Orthographic => t[2],
-        OracleModel::Fisheye | OracleModel::Equirectangular => length(t),
-    }
-}
-
-/// The mean and the Jacobian of perspective, whose point is kept near the viewport.
-fn pinhole(camera: &OracleCamera, t: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
-    let [fx, fy] = camera.focal.map(f64::from);
-    let [cx, cy] = camera.principal.map(f64::from);
-    let (width, height) = (f64::from(camera.width), f64::from(camera.height));
-    let (tan_x, tan_y) = (t[0] / t[2], t[1] / t[2]);
-    let u = tan_x
-        .max(-(cx / fx + 0.15 * width / fx))
-        .min((width - cx) / fx + 0.15 * width / fx);
-    let v = tan_y
-        .max(-(cy / fy + 0.15 * height / fy))
-        .min((height - cy) / fy + 0.15 * height / fy);
-    let jacobian = [
-        [fx / t[2], 0.0, -fx * u / t[2]],
-        [0.0, fy / t[2], -fy * v / t[2]],
-    ];
-    ([fx * tan_x + cx, fy * tan_y + cy], jacobian)
-}
-
-/// The mean and the Jacobian of parallel projection.
-fn orthographic(camera: &OracleCamera, t: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
-    let [fx, fy] = camera.focal.map(f64::from);
-    let [cx, cy] = camera.principal.map(f64::from);
-    let jacobian = [[fx, 0.0, 0.0], [0.0, fy, 0.0]];
-    ([fx * t[0] + cx, fy * t[1] + cy], jacobian)
-}
-
-/// The mean and the Jacobian of the equidistant fisheye, by the chain rule from r = |t.xy| and a = atan2(r, t.z).
-fn fisheye(camera: &OracleCamera, t: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
-    let r = (t[0] * t[0] + t[1] * t[1]).sqrt();
-    let square = dot(t, t);
-    let angle = r.atan2(t[2]);
-    let focal = camera.focal.map(f64::from);
-    let principal = camera.principal.map(f64::from);
-    // On the axis the limits: nothing moves but across it, by 1 / t.z.
-    if r == 0.0 {
-        let scale = if t[2] > 0.0 { 1.0 / t[2] } else { f64::NAN };
-        return (
-            principal,
-            [[focal[0] * scale, 0.0, 0.0], [0.0, focal[1] * scale, 0.0]],
-        );
-    }
-    let row = |axis: usize| {
-        // The place is f (a / r) t[axis]; a / r has the gradient (a' r - a r') / r^2.
-        let gradient: [f64; 3] = std::array::from_fn(|k| {
-            let r_k = if k < 2 { t[k] / r } else { 0.0 };
-            let a_k = if k < 2 {
-                t[2] * t[k] / (r * square)
-            } else {
-                -r / square
-            };
-            let of_ratio = (a_k * r - angle * r_k) / (r * r);
-            let own = if k == axis { angle / r } else { 0.0 };
-            of_ratio * t[axis] + own
-        });
-        gradient.map(|g| focal[axis] * g)
-    };
-    let mean = [0, 1].map(|axis| focal[axis] * angle / r * t[axis] + principal[axis]);
-    (mean, [row(0), row(1)])
-}
-
-fn subtract(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-pub(super) fn length(a: [f64; 3]) -> f64 {
-    dot(a, a).sqrt()
-}
-
-pub(super) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
-}
-
-/// Matrix (row-major) times column.
-fn transform(matrix: &[f64; 9], v: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|row| {
-        dot(
-            [matrix[3 * row], matrix[3 * row + 1], matrix[3 * row + 2]],
-            v,
-        )
-    })
-}
-
-/// Row times matrix (row-major).
-fn multiply_row(v: [f64; 3], matrix: &[f64; 9]) -> [f64; 3] {
-    std::array::from_fn(|column| dot(v, [matrix[column], matrix[3 + column], matrix[6 + column]]))
 }

@@ -6,8 +6,9 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::pixel::Pixel;
-use super::project::{Splat, project};
+use super::project::project;
 use super::rays;
+use super::splat::Splat;
 use super::{OracleCamera, OracleOrder, OracleScene, OracleState, SkipCounts, SkipReason};
 
 /// How far beyond the ellipse on which alpha reaches its floor [`render_bounded`] looks, in px.

@@ -2,10 +2,10 @@
 
 use super::OracleState;
 use super::pixel::{Outcome, Pixel};
-use super::project::Splat;
 use super::render::{Projected, bounded_pixels};
 use super::sample_tests::OracleTests;
 use super::shaded::{OracleOutputs, OracleViewport, project};
+use super::splat::Splat;
 use super::{OracleCamera, OracleScene};
 
 /// One way in which a pixel may come about.

@@ -6,10 +6,11 @@
 use ash::vk;
 use rayon::prelude::*;
 
-use super::pixel::{Alpha, Outcome, Pixel};
-use super::project::Splat;
-use super::rays::{self, RayDepth};
+use super::own_axes::RayDepth;
+use super::pixel::{Outcome, Pixel};
+use super::rays;
 use super::render::{Bound, Projected, Reference, collect};
+use super::splat::{Alpha, Splat};
 use super::{OracleCamera, OracleModel, OracleOrder, OracleScene, OracleState};
 
 /// How a depth attachment holds depths.

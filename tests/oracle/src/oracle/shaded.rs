@@ -1,9 +1,9 @@
 //! Vertex-shader projection: from what a shader wrote of a Gaussian to the numbers that a pixel needs.
 
 use super::error_model::ErrorModel;
-use super::project::{Cholesky, Splat};
-use super::rays::OwnAxes;
+use super::own_axes::OwnAxes;
 use super::render::{Projected, Reference, bounded};
+use super::splat::{Cholesky, Splat};
 use super::{OracleOrder, OracleState, SkipReason};
 
 /// What a vertex shader wrote of one Gaussian.

@@ -1,6 +1,8 @@
 //! The unscented transform.
 
-use super::{OracleCamera, OracleModel, panorama, project};
+use super::projection::mean_and_jacobian;
+use super::vectors::{cross, dot, length};
+use super::{OracleCamera, OracleModel, panorama};
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Dimensions of what is projected.
@@ -32,12 +34,12 @@ pub fn transform(
     if !points[1..].iter().all(|&point| is_seen(camera, t, point)) {
         return None;
     }
-    let center = project::mean_and_jacobian(camera, t).0;
+    let center = mean_and_jacobian(camera, t).0;
     let period = panorama::period(camera);
     let places: Vec<[f64; 2]> = points
         .iter()
         .map(|&point| {
-            let [x, y] = project::mean_and_jacobian(camera, point).0;
+            let [x, y] = mean_and_jacobian(camera, point).0;
             let dx = panorama::nearest(x - center[0], period).unwrap_or(x - center[0]);
             [center[0] + dx, y]
         })
@@ -70,8 +72,8 @@ pub fn transform(
 /// angle away, with what is straight behind outside of the cone of that angle about `t`; by a panorama, with the poles
 /// outside of that cone.
 fn is_seen(camera: &OracleCamera, t: [f64; 3], point: [f64; 3]) -> bool {
-    let cosine = project::dot(t, point);
-    let sine = project::length(project::cross(t, point));
+    let cosine = dot(t, point);
+    let sine = length(cross(t, point));
     let apart = sine.atan2(cosine);
     let from =
         |axis: f64, rest: [f64; 2]| (rest[0] * rest[0] + rest[1] * rest[1]).sqrt().atan2(axis);

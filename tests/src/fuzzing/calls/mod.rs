@@ -4,74 +4,16 @@
 
 mod create;
 mod record;
+mod run;
 mod triangles;
 
-use std::sync::PoisonError;
-
-use ash::vk;
-use gaurast::gaussian_primitive_topology;
-use gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST as GaussianFeatures;
-
 use super::bytes::Bytes;
-use crate::contexts::{Messages, messenger_info};
+use run::Run;
+
+pub use run::Ended;
 
 /// Calls of a run at most.
 const CALLS: usize = 120;
-/// Objects of a kind at most.
-const OBJECTS: usize = 6;
-const FORMATS: [vk::Format; 6] = [
-    vk::Format::R32G32B32A32_SFLOAT,
-    vk::Format::R8G8B8A8_UNORM,
-    vk::Format::B8G8R8A8_SRGB,
-    vk::Format::D32_SFLOAT,
-    vk::Format::D24_UNORM_S8_UINT,
-    vk::Format::R16_UINT,
-];
-
-const DEPTH_FORMATS: [vk::Format; 2] = [vk::Format::D32_SFLOAT, vk::Format::D24_UNORM_S8_UINT];
-
-/// How a run ended.
-#[derive(Clone, Debug, Default)]
-pub struct Ended {
-    /// Calls that returned success, or nothing.
-    pub succeeded: u32,
-    /// Calls that returned an error.
-    pub failed: u32,
-    /// Submissions that were executed.
-    pub submitted: u32,
-    /// Why the device was lost, if it was.
-    pub lost: Option<String>,
-}
-
-struct Resource<T> {
-    handle: T,
-    memory: vk::DeviceMemory,
-    format: vk::Format,
-    extent: [u32; 2],
-}
-
-/// A device and what a run has made.
-struct Run {
-    instance: ash::Instance,
-    device: ash::Device,
-    gaussian: gaussian_primitive_topology::Device,
-    types: vk::PhysicalDeviceMemoryProperties,
-    queue: vk::Queue,
-    pool: vk::CommandPool,
-    commands: vk::CommandBuffer,
-    layout: vk::PipelineLayout,
-    queries: vk::QueryPool,
-    buffers: Vec<Resource<vk::Buffer>>,
-    images: Vec<(Resource<vk::Image>, vk::ImageView)>,
-    pipelines: Vec<vk::Pipeline>,
-    ended: Ended,
-    /// Hears why the device is lost, in `messages`.
-    messenger: vk::DebugUtilsMessengerEXT,
-    debug_utils: ash::ext::debug_utils::Instance,
-    messages: Box<Messages>,
-    /// Last: it may own the library that all others call.
-    _entry: ash::Entry,
-}
 
 /// Makes the calls that bytes say, on a device of its own.
 ///
@@ -84,229 +26,29 @@ pub fn run(data: &[u8]) -> Ended {
         if bytes.is_empty() || run.ended.lost.is_some() {
             break;
         }
-        run.call(&mut bytes);
+        call(&mut run, &mut bytes);
     }
     run.ended.clone()
 }
 
-// `unsafe` here has one reason throughout: these are Vulkan calls whose handles are live and whose pointers are valid,
-// which is all that the driver relies upon; see the module.
-impl Run {
-    fn new() -> Self {
-        let entry = vulkan_gaurast::entry();
-        // SAFETY: see above.
-        unsafe {
-            let application = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
-            let extensions = [ash::ext::debug_utils::NAME.as_ptr()];
-            let info = vk::InstanceCreateInfo::default()
-                .application_info(&application)
-                .enabled_extension_names(&extensions);
-            let instance = entry.create_instance(&info, None).expect("an instance");
-            let messages = Box::<Messages>::default();
-            let debug_utils = ash::ext::debug_utils::Instance::new(&entry, &instance);
-            let messenger = debug_utils
-                .create_debug_utils_messenger(&messenger_info(&messages), None)
-                .expect("a messenger");
-            let physical = instance.enumerate_physical_devices().expect("devices")[0];
-            let queues = [vk::DeviceQueueCreateInfo::default().queue_priorities(&[1.0])];
-            let extensions = [gaussian_primitive_topology::NAME.as_ptr()];
-            let mut gaussian = GaussianFeatures::default()
-                .gaussian_primitive_topology(true)
-                .primitive_order(true)
-                .radial_distance_order(true)
-                .orthographic_camera(true)
-                .fisheye_camera(true)
-                .equirectangular_camera(true)
-                .per_pixel_order(true)
-                .rasterization_float16(true)
-                .unscented_projection(true)
-                .gaussian_2d(true)
-                .gaussian_depth_stencil(true)
-                .gaussian_multisample(true)
-                .gaussian_approximation(true);
-            let mut core = vk::PhysicalDeviceVulkan13Features::default().dynamic_rendering(true);
-            let features = instance.get_physical_device_features(physical);
-            let info = vk::DeviceCreateInfo::default()
-                .enabled_features(&features)
-                .queue_create_infos(&queues)
-                .enabled_extension_names(&extensions)
-                .push_next(&mut core)
-                .push_next(&mut gaussian);
-            let device = instance
-                .create_device(physical, &info, None)
-                .expect("a device");
-            let flags = vk::CommandPoolCreateFlags::RESET_COMMAND_BUFFER;
-            let pool = vk::CommandPoolCreateInfo::default().flags(flags);
-            let pool = device.create_command_pool(&pool, None).expect("a pool");
-            let info = vk::CommandBufferAllocateInfo::default()
-                .command_pool(pool)
-                .command_buffer_count(1);
-            let commands = device
-                .allocate_command_buffers(&info)
-                .expect("a command buffer")[0];
-            let constants = [vk::PushConstantRange::default()
-                .stage_flags(vk::ShaderStageFlags::VERTEX)
-                .size(16)];
-            let layout = vk::PipelineLayoutCreateInfo::default().push_constant_ranges(&constants);
-            let queries = vk::QueryPoolCreateInfo::default()
-                .query_type(vk::QueryType::TIMESTAMP)
-                .query_count(4);
-            Self {
-                gaussian: gaussian_primitive_topology::Device::new(&instance, &device),
-                types: instance.get_physical_device_memory_properties(physical),
-                queue: device.get_device_queue(0, 0),
-                layout: device
-                    .create_pipeline_layout(&layout, None)
-                    .expect("a layout"),
-                queries: device.create_query_pool(&queries, None).expect("queries"),
-                instance,
-                device,
-                pool,
-                commands,
-                buffers: Vec::new(),
-                images: Vec::new(),
-                pipelines: Vec::new(),
-                ended: Ended::default(),
-                messenger,
-                debug_utils,
-                messages,
-                _entry: entry,
-            }
-        }
-    }
-
-    /// Counts what a call returned.
-    fn note<T>(&mut self, result: ash::prelude::VkResult<T>) -> Option<T> {
-        match result {
-            Ok(value) => {
-                self.ended.succeeded += 1;
-                Some(value)
-            }
-            Err(error) => {
-                self.ended.failed += 1;
-                if error == vk::Result::ERROR_DEVICE_LOST && self.ended.lost.is_none() {
-                    self.ended.lost = Some(self.reason());
-                }
-                // A defect of the driver, or a handle that it doesn't know.
-                assert_ne!(error, vk::Result::ERROR_UNKNOWN);
-                None
-            }
-        }
-    }
-
-    /// What the driver said of the loss of the device.
-    fn reason(&self) -> String {
-        let messages = self.messages.lock().unwrap_or_else(PoisonError::into_inner);
-        let said = messages.iter().find(|it| it.id == "GAURAST-device-lost");
-        said.map_or_else(|| "nothing was said".to_owned(), |it| it.text.clone())
-    }
-
-    fn call(&mut self, bytes: &mut Bytes<'_>) {
-        match bytes.below(32) {
-            0 | 1 => self.create_buffer(bytes),
-            2 | 3 => self.create_image(bytes),
-            4 if bytes.rarely(2) => self.create_triangle_pipeline(bytes),
-            4 => self.create_pipeline(bytes),
-            5 => self.map(bytes),
-            6 => self.destroy(bytes),
-            7 | 8 => self.begin(bytes),
-            9 | 10 => self.submit(),
-            11 | 12 => self.begin_rendering(bytes),
-            // SAFETY: see above.
-            13 => unsafe { self.device.cmd_end_rendering(self.commands) },
-            14..18 => self.copy(bytes),
-            18 | 19 => self.query(bytes),
-            20 | 21 => self.set_state(bytes),
-            22..24 => self.bind_vertex_buffers(bytes),
-            24 => self.clear(bytes),
-            _ => self.draw(bytes),
-        }
-    }
-
-    fn destroy(&mut self, bytes: &mut Bytes<'_>) {
-        // Nothing is in use: submissions are waited for, and what is recorded is made anew.
-        self.reset();
-        // SAFETY: see above.
-        unsafe {
-            if bytes.rarely(2) && !self.buffers.is_empty() {
-                let buffer = self.buffers.swap_remove(bytes.below(self.buffers.len()));
-                self.device.destroy_buffer(buffer.handle, None);
-                self.device.free_memory(buffer.memory, None);
-            } else if !self.images.is_empty() {
-                let (image, view) = self.images.swap_remove(bytes.below(self.images.len()));
-                self.device.destroy_image_view(view, None);
-                self.device.destroy_image(image.handle, None);
-                self.device.free_memory(image.memory, None);
-            }
-        }
-    }
-
-    fn reset(&mut self) {
-        let flags = vk::CommandBufferResetFlags::empty();
-        // SAFETY: see above.
-        let reset = unsafe { self.device.reset_command_buffer(self.commands, flags) };
-        self.note(reset);
-    }
-
-    fn begin(&mut self, bytes: &mut Bytes<'_>) {
-        let flags = bytes.one(&[
-            vk::CommandBufferUsageFlags::empty(),
-            vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT,
-        ]);
-        let info = vk::CommandBufferBeginInfo::default().flags(flags);
-        // SAFETY: see above.
-        let begun = unsafe { self.device.begin_command_buffer(self.commands, &info) };
-        self.note(begun);
-    }
-
-    fn submit(&mut self) {
-        let commands = [self.commands];
-        let submits = [vk::SubmitInfo::default().command_buffers(&commands)];
-        // SAFETY: see above.
-        unsafe {
-            let ended = self.device.end_command_buffer(self.commands);
-            self.note(ended);
-            let submitted = self
-                .device
-                .queue_submit(self.queue, &submits, vk::Fence::null());
-            if self.note(submitted).is_some() {
-                self.ended.submitted += 1;
-            }
-            let idle = self.device.queue_wait_idle(self.queue);
-            self.note(idle);
-        }
-        self.reset();
-    }
-}
-
-fn pick<'a, T>(bytes: &mut Bytes<'_>, all: &'a [T]) -> Option<&'a T> {
-    (!all.is_empty()).then(|| &all[bytes.below(all.len())])
-}
-
-impl Drop for Run {
-    fn drop(&mut self) {
-        // SAFETY: see above; the device is idle, or lost.
-        unsafe {
-            let _ = self.device.device_wait_idle();
-            for pipeline in &self.pipelines {
-                self.device.destroy_pipeline(*pipeline, None);
-            }
-            for (image, view) in &self.images {
-                self.device.destroy_image_view(*view, None);
-                self.device.destroy_image(image.handle, None);
-                self.device.free_memory(image.memory, None);
-            }
-            for buffer in &self.buffers {
-                self.device.destroy_buffer(buffer.handle, None);
-                self.device.free_memory(buffer.memory, None);
-            }
-            self.device.destroy_query_pool(self.queries, None);
-            self.device.destroy_pipeline_layout(self.layout, None);
-            self.device.destroy_command_pool(self.pool, None);
-            self.device.destroy_device(None);
-            self.debug_utils
-                .destroy_debug_utils_messenger(self.messenger, None);
-            self.instance.destroy_instance(None);
-        }
+fn call(run: &mut Run, bytes: &mut Bytes<'_>) {
+    match bytes.below(32) {
+        0 | 1 => create::create_buffer(run, bytes),
+        2 | 3 => create::create_image(run, bytes),
+        4 if bytes.rarely(2) => triangles::create_pipeline(run, bytes),
+        4 => create::create_pipeline(run, bytes),
+        5 => create::map(run, bytes),
+        6 => run.destroy(bytes),
+        7 | 8 => run.begin(bytes),
+        9 | 10 => run.submit(),
+        11 | 12 => record::begin_rendering(run, bytes),
+        // SAFETY: see `run`.
+        13 => unsafe { run.device.cmd_end_rendering(run.commands) },
+        14..18 => record::copy(run, bytes),
+        18 | 19 => record::query(run, bytes),
+        20 | 21 => record::set_state(run, bytes),
+        22..24 => record::bind_vertex_buffers(run, bytes),
+        24 => record::clear(run, bytes),
+        _ => record::draw(run, bytes),
     }
 }

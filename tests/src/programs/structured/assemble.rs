@@ -1,7 +1,7 @@
 //! Programs as SPIR-V.
 
 use super::super::assembler::{Assembler, Id};
-use super::{
+use super::program::{
     ARRAY, Binary, Compare, Condition, Expression, Function, INVOCATIONS, Loop, Program, Statement,
     Switch, VARIABLES,
 };

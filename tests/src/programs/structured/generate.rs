@@ -1,8 +1,9 @@
 //! Makes programs from seeds.
 
-use super::{
+use super::interpret::run;
+use super::program::{
     Binary, Case, Compare, Condition, Expression, Function, Loop, Program, Statement, Switch,
-    VARIABLES, run,
+    VARIABLES,
 };
 use rand::seq::IndexedRandom;
 use rand::{Rng, SeedableRng};

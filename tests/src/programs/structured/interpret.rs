@@ -1,6 +1,6 @@
 //! What programs compute, one invocation at a time.
 
-use super::{
+use super::program::{
     ARRAY, Binary, Compare, Condition, Expression, Function, Loop, Program, Statement, Switch,
     VARIABLES, mixed,
 };

@@ -1,6 +1,6 @@
 //! Scenes that sweep the state of triangle pipelines, each named after what it shows.
 
-use super::{Gpu, Output};
+use gaurast_testkit::Gpu;
 
 mod blending;
 mod commands;
@@ -15,6 +15,8 @@ mod simple;
 mod texture;
 mod topology;
 
+pub use super::outcome::{Drawn, Missing};
+
 /// A scene: one function that draws it on any device.
 #[derive(Clone, Copy, Debug)]
 pub struct Scene {
@@ -23,14 +25,6 @@ pub struct Scene {
     /// Draws it.
     pub draw: fn(&Gpu) -> Drawn,
 }
-
-/// What a scene leaves behind, unless the device lacks an optional feature that it needs.
-pub type Drawn = Result<Output, Missing>;
-
-/// An optional feature that a device does not have.
-#[derive(Clone, Debug, thiserror::Error)]
-#[error("the device does not have {0}")]
-pub struct Missing(pub String);
 
 /// The scene of a name.
 pub fn find(name: &str) -> Option<&'static Scene> {

@@ -1,6 +1,6 @@
 //! Accessors: attributes of vertices as floats.
 
-use super::Reader;
+use super::buffers::Buffers;
 use crate::error::{Fault, Place, Reason};
 
 /// The type of an attribute's components: glTF's `componentType`, and whether whole numbers are fractions of the largest
@@ -91,69 +91,67 @@ pub(super) struct Demand {
     pub(super) expected: &'static str,
 }
 
-impl Reader<'_> {
-    /// The values of accessor `index`, for messages `place`: element after element.
-    pub(super) fn values(
-        &mut self,
-        index: usize,
-        demand: &Demand,
-        place: &str,
-    ) -> Result<Vec<f32>, Fault> {
-        let at = |reason: Reason| reason.at(Place::Part(place.to_owned()));
-        let document = self.document;
-        let accessor = document
-            .accessors
-            .get(index)
-            .ok_or_else(|| at(Reason::Missing))?;
-        let shape = match demand.width {
-            1 => "SCALAR",
-            3 => "VEC3",
-            _ => "VEC4",
-        };
-        if accessor.shape != shape {
-            let text = format!("its type is {:?}, not {shape:?}", accessor.shape);
-            return Err(at(Reason::Unsupported(text)));
-        }
-        let component = Component {
-            kind: accessor.component_type,
-            // Of floats the word says nothing.
-            normalized: accessor.normalized && accessor.component_type != FLOAT,
-        };
-        if !demand.components.contains(&component) {
-            let (found, expected) = (component.name(), demand.expected);
-            return Err(at(Reason::Type { found, expected }));
-        }
-        if accessor.sparse.is_some() {
-            let text = "it is sparse, which is not read";
-            return Err(at(Reason::Unsupported(text.to_owned())));
-        }
-        let Some(view) = accessor.buffer_view else {
-            let text = "it has no data of its own";
-            return Err(at(Reason::Unsupported(text.to_owned())));
-        };
-        let (bytes, stride) = self.view(view, place)?;
-        let size = demand.width * component.size();
-        let stride = stride.unwrap_or(size);
-        let available = bytes.len() as u64;
-        let bytes = bytes.get(accessor.byte_offset..).unwrap_or_default();
-        let claimed = (accessor.count as u64)
-            .saturating_sub(1)
-            .saturating_mul(stride as u64)
-            .saturating_add(size as u64)
-            .saturating_add(accessor.byte_offset as u64);
-        if claimed > available || stride < size {
-            return Err(at(Reason::TooShort { claimed, available }));
-        }
-        let len = accessor.count * demand.width;
-        let mut values = Vec::new();
-        values
-            .try_reserve_exact(len)
-            .map_err(|_| at(Reason::Memory(4 * len as u64)))?;
-        for element in bytes.chunks(stride).take(accessor.count) {
-            for c in 0..demand.width {
-                values.push(component.decode(&element[c * component.size()..]));
-            }
-        }
-        Ok(values)
+/// The values of accessor `index`, for messages `place`: element after element.
+pub(super) fn values(
+    buffers: &mut Buffers<'_>,
+    index: usize,
+    demand: &Demand,
+    place: &str,
+) -> Result<Vec<f32>, Fault> {
+    let at = |reason: Reason| reason.at(Place::Part(place.to_owned()));
+    let document = buffers.document;
+    let accessor = document
+        .accessors
+        .get(index)
+        .ok_or_else(|| at(Reason::Missing))?;
+    let shape = match demand.width {
+        1 => "SCALAR",
+        3 => "VEC3",
+        _ => "VEC4",
+    };
+    if accessor.shape != shape {
+        let text = format!("its type is {:?}, not {shape:?}", accessor.shape);
+        return Err(at(Reason::Unsupported(text)));
     }
+    let component = Component {
+        kind: accessor.component_type,
+        // Of floats the word says nothing.
+        normalized: accessor.normalized && accessor.component_type != FLOAT,
+    };
+    if !demand.components.contains(&component) {
+        let (found, expected) = (component.name(), demand.expected);
+        return Err(at(Reason::Type { found, expected }));
+    }
+    if accessor.sparse.is_some() {
+        let text = "it is sparse, which is not read";
+        return Err(at(Reason::Unsupported(text.to_owned())));
+    }
+    let Some(view) = accessor.buffer_view else {
+        let text = "it has no data of its own";
+        return Err(at(Reason::Unsupported(text.to_owned())));
+    };
+    let (bytes, stride) = buffers.view(view, place)?;
+    let size = demand.width * component.size();
+    let stride = stride.unwrap_or(size);
+    let available = bytes.len() as u64;
+    let bytes = bytes.get(accessor.byte_offset..).unwrap_or_default();
+    let claimed = (accessor.count as u64)
+        .saturating_sub(1)
+        .saturating_mul(stride as u64)
+        .saturating_add(size as u64)
+        .saturating_add(accessor.byte_offset as u64);
+    if claimed > available || stride < size {
+        return Err(at(Reason::TooShort { claimed, available }));
+    }
+    let len = accessor.count * demand.width;
+    let mut values = Vec::new();
+    values
+        .try_reserve_exact(len)
+        .map_err(|_| at(Reason::Memory(4 * len as u64)))?;
+    for element in bytes.chunks(stride).take(accessor.count) {
+        for c in 0..demand.width {
+            values.push(component.decode(&element[c * component.size()..]));
+        }
+    }
+    Ok(values)
 }

@@ -7,9 +7,19 @@ use serde::de::IgnoredAny;
 
 use crate::error::{Fault, Place, Reason};
 
+/// The extension's name.
+pub(super) const EXTENSION: &str = "KHR_gaussian_splatting";
+
+/// Names of draft extensions that keep Gaussians as SPZ, in an object of the extension or, the last one, beside it.
+pub(super) const DRAFTS: [&str; 3] = [
+    "KHR_gaussian_splatting_compression_spz_2",
+    "KHR_gaussian_splatting_compression_spz",
+    "KHR_spz_gaussian_splats_compression",
+];
+
 /// Extensions that a document may require and this reader follows, or that say nothing of Gaussians.
 const FOLLOWED: [&str; 5] = [
-    super::primitive::EXTENSION,
+    EXTENSION,
     "KHR_mesh_quantization",
     "KHR_lights_punctual",
     "KHR_xmp_json_ld",
@@ -126,7 +136,7 @@ impl Document {
         }
         let unknown = self.extensions_required.iter().find(|name| {
             !FOLLOWED.contains(&name.as_str())
-                && !super::primitive::DRAFTS.contains(&name.as_str())
+                && !DRAFTS.contains(&name.as_str())
                 && !IRRELEVANT.iter().any(|start| name.starts_with(start))
         });
         match unknown {

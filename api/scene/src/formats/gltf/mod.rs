@@ -4,12 +4,10 @@
 //! around x. Draft extensions that keep a primitive's Gaussians as SPZ are read, and said to be drafts.
 
 mod accessor;
+mod buffers;
 mod document;
 mod primitive;
 
-use std::borrow::Cow;
-
-use base64::Engine;
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 
 use super::input::{Format, Input, Origin};
@@ -17,6 +15,7 @@ use super::spz::one_line;
 use crate::error::{Fault, Place, Reason};
 use crate::scene::Scene;
 use crate::transform::Motion;
+use buffers::Buffers;
 use document::{Document, Node};
 
 /// The format as JSON.
@@ -111,9 +110,7 @@ fn load(json: &[u8], binary: Option<&[u8]>, origin: Origin<'_>) -> Result<Scene,
     document.check()?;
     let mut reader = Reader {
         document: &document,
-        binary,
-        buffers: document.buffers.iter().map(|_| None).collect(),
-        origin,
+        buffers: Buffers::new(&document, binary, origin),
         scene: Scene::default(),
         visited: vec![false; document.nodes.len()],
         other_primitives: 0,
@@ -145,10 +142,7 @@ fn load(json: &[u8], binary: Option<&[u8]>, origin: Origin<'_>) -> Result<Scene,
 /// A document that is read into a scene, node by node.
 struct Reader<'a> {
     document: &'a Document,
-    binary: Option<&'a [u8]>,
-    /// Buffers, as far as they have been needed.
-    buffers: Vec<Option<Cow<'a, [u8]>>>,
-    origin: Origin<'a>,
+    buffers: Buffers<'a>,
     scene: Scene,
     /// Nodes that have been visited; each is in a tree once.
     visited: Vec<bool>,
@@ -172,7 +166,7 @@ fn local(node: &Node) -> DAffine3 {
     )
 }
 
-impl<'a> Reader<'a> {
+impl Reader<'_> {
     /// Reads the Gaussians of node `root` and of those below it, moved by `above` and by their nodes.
     fn visit(&mut self, root: usize, above: DAffine3) -> Result<(), Fault> {
         let mut stack = vec![(root, above)];
@@ -210,7 +204,8 @@ impl<'a> Reader<'a> {
             .ok_or_else(|| Reason::Missing.at(Place::Part(format!("mesh {index}"))))?;
         for (number, primitive) in mesh.primitives.iter().enumerate() {
             let place = format!("mesh {index}, primitive {number}");
-            let Some(mut scene) = self.gaussians(primitive, &place)? else {
+            let Some(mut scene) = primitive::gaussians(&mut self.buffers, primitive, &place)?
+            else {
                 self.other_primitives += 1;
                 continue;
             };
@@ -223,104 +218,4 @@ impl<'a> Reader<'a> {
         }
         Ok(())
     }
-
-    /// The bytes of buffer view `index`, named by `place`, and the distance between its elements.
-    fn view(&mut self, index: usize, place: &str) -> Result<(&[u8], Option<usize>), Fault> {
-        let at = |reason: Reason, field: &str| reason.at(Place::Part(format!("{place}, {field}")));
-        let document = self.document;
-        let view = document
-            .buffer_views
-            .get(index)
-            .ok_or_else(|| at(Reason::Missing, "bufferView"))?;
-        if let Some(extension) = view
-            .extensions
-            .keys()
-            .find(|name| name.contains("compression"))
-        {
-            let text = format!("its extension {extension:?} is not read");
-            return Err(at(Reason::Unsupported(text), "bufferView"));
-        }
-        let buffer = self.buffer(view.buffer)?;
-        let bytes = view
-            .byte_offset
-            .checked_add(view.byte_length)
-            .and_then(|end| buffer.get(view.byte_offset..end));
-        let bytes = bytes.ok_or_else(|| {
-            let claimed = (view.byte_offset as u64).saturating_add(view.byte_length as u64);
-            let available = buffer.len() as u64;
-            at(Reason::TooShort { claimed, available }, "bufferView")
-        })?;
-        Ok((bytes, view.byte_stride))
-    }
-
-    /// The bytes of buffer `index`.
-    fn buffer(&mut self, index: usize) -> Result<&[u8], Fault> {
-        let document = self.document;
-        let at = |reason: Reason| reason.at(Place::Part(format!("buffer {index}")));
-        let buffer = document
-            .buffers
-            .get(index)
-            .ok_or_else(|| at(Reason::Missing))?;
-        if self.buffers[index].is_none() {
-            let bytes: Cow<'a, [u8]> = match &buffer.uri {
-                None if index == 0 => {
-                    Cow::Borrowed(self.binary.ok_or_else(|| at(Reason::Missing))?)
-                }
-                None => return Err(at(Reason::Missing)),
-                Some(uri) => {
-                    Cow::Owned(
-                        resource(uri, self.origin).map_err(|fault| match fault.place {
-                            Place::File => at(fault.reason),
-                            _ => fault,
-                        })?,
-                    )
-                }
-            };
-            self.buffers[index] = Some(bytes);
-        }
-        let bytes = self.buffers[index].as_deref().unwrap_or_default();
-        bytes.get(..buffer.byte_length).ok_or_else(|| {
-            let (claimed, available) = (buffer.byte_length as u64, bytes.len() as u64);
-            at(Reason::TooShort { claimed, available })
-        })
-    }
-}
-
-/// The bytes of `uri`: base64 in it, or a file beside the document.
-fn resource(uri: &str, origin: Origin<'_>) -> Result<Vec<u8>, Fault> {
-    let Some(data) = uri.strip_prefix("data:") else {
-        return origin.companion(&percent_decoded(uri));
-    };
-    let malformed = || {
-        let text = "its data is not base64";
-        Reason::Unsupported(text.to_owned()).at(Place::File)
-    };
-    let (kind, data) = data.split_once(',').ok_or_else(malformed)?;
-    if !kind.ends_with(";base64") {
-        return Err(malformed());
-    }
-    base64::engine::general_purpose::STANDARD
-        .decode(data)
-        .map_err(|_| malformed())
-}
-
-/// `text` with `%` and two hexadecimal digits replaced by the byte that they are.
-fn percent_decoded(text: &str) -> String {
-    let digit = |byte: Option<&u8>| char::from(*byte?).to_digit(16);
-    let bytes = text.as_bytes();
-    let mut decoded = Vec::with_capacity(bytes.len());
-    let mut at = 0;
-    while at < bytes.len() {
-        match (digit(bytes.get(at + 1)), digit(bytes.get(at + 2))) {
-            (Some(high), Some(low)) if bytes[at] == b'%' => {
-                decoded.push((16 * high + low) as u8);
-                at += 3;
-            }
-            _ => {
-                decoded.push(bytes[at]);
-                at += 1;
-            }
-        }
-    }
-    String::from_utf8_lossy(&decoded).into_owned()
 }

@@ -4,24 +4,18 @@ use std::collections::HashMap;
 
 use serde::Deserialize;
 
-use super::Reader;
-use super::accessor::{BYTE, Component, Demand, FLOAT, SHORT, UNSIGNED_BYTE, UNSIGNED_SHORT};
-use super::document::Primitive;
+use super::accessor::{
+    BYTE, Component, Demand, FLOAT, SHORT, UNSIGNED_BYTE, UNSIGNED_SHORT, values,
+};
+use super::buffers::Buffers;
+use super::document::{DRAFTS, EXTENSION, Primitive};
 use crate::error::{Fault, Place, Reason};
 use crate::formats::input::Input;
 use crate::formats::spz::{self, CoordinateSystem};
+use crate::harmonics::sh_coefficients;
 use crate::metadata::{ColorSpace, Metadata, SortOrder};
-use crate::scene::{GaussianShape, Scene, sh_coefficients};
-
-/// The extension's name.
-pub(super) const EXTENSION: &str = "KHR_gaussian_splatting";
-
-/// Names of draft extensions that keep Gaussians as SPZ, in an object of the extension or, the last one, beside it.
-pub(super) const DRAFTS: [&str; 3] = [
-    "KHR_gaussian_splatting_compression_spz_2",
-    "KHR_gaussian_splatting_compression_spz",
-    "KHR_spz_gaussian_splats_compression",
-];
+use crate::scene::Scene;
+use crate::shape::GaussianShape;
 
 /// The highest spherical harmonics degree of the extension.
 const MAX_DEGREE: u32 = 3;
@@ -101,128 +95,128 @@ const COEFFICIENT: Demand = Demand {
     expected: "float",
 };
 
-impl Reader<'_> {
-    /// The Gaussians of `primitive`, for messages `place`, in the frame of its mesh. None if it has none.
-    pub(super) fn gaussians(
-        &mut self,
-        primitive: &Primitive,
-        place: &str,
-    ) -> Result<Option<Scene>, Fault> {
-        let at = |reason: Reason, field: &str| reason.at(Place::Part(format!("{place}, {field}")));
-        let malformed =
-            |error: serde_json::Error| at(Reason::Json(spz::one_line(&error)), EXTENSION);
-        let (splatting, metadata) = match primitive.extensions.get(EXTENSION) {
-            Some(value) => {
-                let splatting = Splatting::deserialize(value).map_err(malformed)?;
-                let metadata = splatting.metadata(place)?;
-                (Some(splatting), metadata)
-            }
-            None => (None, Metadata::default()),
-        };
-        let within = splatting.iter().flat_map(|splatting| &splatting.extensions);
-        let draft = within
-            .chain(&primitive.extensions)
-            .find(|(name, _)| DRAFTS.contains(&name.as_str()));
-        let mut scene = if let Some((name, value)) = draft {
-            let compressed = Compressed::deserialize(value).map_err(malformed)?;
-            let mut scene = self.compressed(compressed.buffer_view, place)?;
-            scene
-                .metadata_mut()
-                .note(format!("the extension {name} is a draft of glTF's"));
-            scene
-        } else if splatting.is_some() {
-            if primitive.mode != Some(POINTS) {
-                let text = "Gaussians are points (mode 0)";
-                return Err(at(Reason::Unsupported(text.to_owned()), "mode"));
-            }
-            self.attributes(primitive, place)?
-        } else {
-            return Ok(None);
-        };
-        let notes = std::mem::take(&mut scene.metadata_mut().notes);
-        let antialiasing = scene.metadata().antialiasing;
-        *scene.metadata_mut() = metadata;
-        scene.metadata_mut().antialiasing = antialiasing;
-        for note in notes {
-            scene.metadata_mut().note(note);
+/// The Gaussians of `primitive`, for messages `place`, in the frame of its mesh. None if it has none.
+pub(super) fn gaussians(
+    buffers: &mut Buffers<'_>,
+    primitive: &Primitive,
+    place: &str,
+) -> Result<Option<Scene>, Fault> {
+    let at = |reason: Reason, field: &str| reason.at(Place::Part(format!("{place}, {field}")));
+    let malformed = |error: serde_json::Error| at(Reason::Json(spz::one_line(&error)), EXTENSION);
+    let (splatting, metadata) = match primitive.extensions.get(EXTENSION) {
+        Some(value) => {
+            let splatting = Splatting::deserialize(value).map_err(malformed)?;
+            let metadata = splatting.metadata(place)?;
+            (Some(splatting), metadata)
         }
-        Ok(Some(scene))
+        None => (None, Metadata::default()),
+    };
+    let within = splatting.iter().flat_map(|splatting| &splatting.extensions);
+    let draft = within
+        .chain(&primitive.extensions)
+        .find(|(name, _)| DRAFTS.contains(&name.as_str()));
+    let mut scene = if let Some((name, value)) = draft {
+        let compressed = Compressed::deserialize(value).map_err(malformed)?;
+        let mut scene = from_spz(buffers, compressed.buffer_view, place)?;
+        scene
+            .metadata_mut()
+            .note(format!("the extension {name} is a draft of glTF's"));
+        scene
+    } else if splatting.is_some() {
+        if primitive.mode != Some(POINTS) {
+            let text = "Gaussians are points (mode 0)";
+            return Err(at(Reason::Unsupported(text.to_owned()), "mode"));
+        }
+        attributes(buffers, primitive, place)?
+    } else {
+        return Ok(None);
+    };
+    let notes = std::mem::take(&mut scene.metadata_mut().notes);
+    let antialiasing = scene.metadata().antialiasing;
+    *scene.metadata_mut() = metadata;
+    scene.metadata_mut().antialiasing = antialiasing;
+    for note in notes {
+        scene.metadata_mut().note(note);
     }
+    Ok(Some(scene))
+}
 
-    /// The Gaussians of the SPZ file in buffer view `view`.
-    fn compressed(&mut self, view: usize, place: &str) -> Result<Scene, Fault> {
-        let origin = self.origin;
-        let (mut bytes, _) = self.view(view, place)?;
-        let len = bytes.len() as u64;
-        let mut input = Input::new(&mut bytes, len, origin);
-        spz::load_into(&mut input, CoordinateSystem::LEFT_UP_FRONT).map_err(|fault| {
-            let place = format!("{place}, the SPZ file in it, {}", fault.place);
-            fault.reason.at(Place::Part(place))
-        })
-    }
+/// The Gaussians of the SPZ file in buffer view `view`.
+fn from_spz(buffers: &mut Buffers<'_>, view: usize, place: &str) -> Result<Scene, Fault> {
+    let origin = buffers.origin;
+    let (mut bytes, _) = buffers.view(view, place)?;
+    let len = bytes.len() as u64;
+    let mut input = Input::new(&mut bytes, len, origin);
+    spz::load_into(&mut input, CoordinateSystem::LEFT_UP_FRONT).map_err(|fault| {
+        let place = format!("{place}, the SPZ file in it, {}", fault.place);
+        fault.reason.at(Place::Part(place))
+    })
+}
 
-    /// The Gaussians of the attributes of `primitive`.
-    fn attributes(&mut self, primitive: &Primitive, place: &str) -> Result<Scene, Fault> {
-        let accessor = |name: &str| primitive.attributes.get(name).copied();
-        let name = |l: u32, n: u32| format!("{EXTENSION}:SH_DEGREE_{l}_COEF_{n}");
-        let degree = (1..=MAX_DEGREE)
-            .rev()
-            .find(|l| (0..=2 * l).any(|n| accessor(&name(*l, n)).is_some()))
-            .unwrap_or(0);
-        let mut read = |name: &str, demand: &Demand, count: Option<usize>| {
-            let place = format!("{place}, {name}");
-            let index =
-                accessor(name).ok_or_else(|| Reason::Missing.at(Place::Part(place.clone())))?;
-            let values = self.values(index, demand, &place)?;
-            let (found, expected) = (values.len() / demand.width, count);
-            match expected.filter(|expected| found != *expected) {
-                Some(expected) => {
-                    let (found, expected) = (found as u64, expected as u64);
-                    Err(Reason::Count { found, expected }.at(Place::Part(place)))
-                }
-                None => Ok(values),
+/// The Gaussians of the attributes of `primitive`.
+fn attributes(
+    buffers: &mut Buffers<'_>,
+    primitive: &Primitive,
+    place: &str,
+) -> Result<Scene, Fault> {
+    let accessor = |name: &str| primitive.attributes.get(name).copied();
+    let name = |l: u32, n: u32| format!("{EXTENSION}:SH_DEGREE_{l}_COEF_{n}");
+    let degree = (1..=MAX_DEGREE)
+        .rev()
+        .find(|l| (0..=2 * l).any(|n| accessor(&name(*l, n)).is_some()))
+        .unwrap_or(0);
+    let mut read = |name: &str, demand: &Demand, count: Option<usize>| {
+        let place = format!("{place}, {name}");
+        let index = accessor(name).ok_or_else(|| Reason::Missing.at(Place::Part(place.clone())))?;
+        let values = values(buffers, index, demand, &place)?;
+        let (found, expected) = (values.len() / demand.width, count);
+        match expected.filter(|expected| found != *expected) {
+            Some(expected) => {
+                let (found, expected) = (found as u64, expected as u64);
+                Err(Reason::Count { found, expected }.at(Place::Part(place)))
             }
-        };
-        let positions = read("POSITION", &POSITION, None)?;
-        let count = positions.len() / 3;
-        let same = Some(count);
-        let rotations = read(&format!("{EXTENSION}:ROTATION"), &ROTATION, same)?;
-        let scales = read(&format!("{EXTENSION}:SCALE"), &SCALE, same)?;
-        let opacities = read(&format!("{EXTENSION}:OPACITY"), &OPACITY, same)?;
-        let mut coefficients = Vec::with_capacity(sh_coefficients(degree));
-        for l in 0..=degree {
-            for n in 0..=2 * l {
-                coefficients.push(read(&name(l, n), &COEFFICIENT, same)?);
-            }
+            None => Ok(values),
         }
-        let vector = |values: &[f32], i: usize| std::array::from_fn(|axis| values[3 * i + axis]);
-        let mut scene = Scene::try_generate(degree, count, |i, sh| {
-            let [x, y, z, w] = std::array::from_fn(|c| rotations[4 * i + c]);
-            let shape = GaussianShape {
-                scale: vector(&scales, i).map(f32::abs),
-                rotation: [w, x, y, z],
-                opacity: opacities[i].clamp(0.0, 1.0),
-            };
-            for (rgb, values) in sh.iter_mut().zip(&coefficients) {
-                *rgb = vector(values, i);
-            }
-            (vector(&positions, i), shape)
-        })?;
-        if scales.iter().any(|scale| *scale < 0.0) {
-            scene
-                .metadata_mut()
-                .note("scales are negative, and their magnitudes are taken");
+    };
+    let positions = read("POSITION", &POSITION, None)?;
+    let count = positions.len() / 3;
+    let same = Some(count);
+    let rotations = read(&format!("{EXTENSION}:ROTATION"), &ROTATION, same)?;
+    let scales = read(&format!("{EXTENSION}:SCALE"), &SCALE, same)?;
+    let opacities = read(&format!("{EXTENSION}:OPACITY"), &OPACITY, same)?;
+    let mut coefficients = Vec::with_capacity(sh_coefficients(degree));
+    for l in 0..=degree {
+        for n in 0..=2 * l {
+            coefficients.push(read(&name(l, n), &COEFFICIENT, same)?);
         }
-        if opacities
-            .iter()
-            .any(|opacity| !(0.0..=1.0).contains(opacity))
-        {
-            scene
-                .metadata_mut()
-                .note("opacities lie outside 0 to 1, and are clamped");
-        }
-        Ok(scene)
     }
+    let vector = |values: &[f32], i: usize| std::array::from_fn(|axis| values[3 * i + axis]);
+    let mut scene = Scene::try_generate(degree, count, |i, sh| {
+        let [x, y, z, w] = std::array::from_fn(|c| rotations[4 * i + c]);
+        let shape = GaussianShape {
+            scale: vector(&scales, i).map(f32::abs),
+            rotation: [w, x, y, z],
+            opacity: opacities[i].clamp(0.0, 1.0),
+        };
+        for (rgb, values) in sh.iter_mut().zip(&coefficients) {
+            *rgb = vector(values, i);
+        }
+        (vector(&positions, i), shape)
+    })?;
+    if scales.iter().any(|scale| *scale < 0.0) {
+        scene
+            .metadata_mut()
+            .note("scales are negative, and their magnitudes are taken");
+    }
+    if opacities
+        .iter()
+        .any(|opacity| !(0.0..=1.0).contains(opacity))
+    {
+        scene
+            .metadata_mut()
+            .note("opacities lie outside 0 to 1, and are clamped");
+    }
+    Ok(scene)
 }
 
 impl Splatting {

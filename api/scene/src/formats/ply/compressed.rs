@@ -13,7 +13,9 @@ use ply_rs_bw::ply::ScalarType;
 use super::inria;
 use super::table::Table;
 use crate::error::{Fault, Place, Reason};
-use crate::scene::{GaussianShape, SH_C0, Scene};
+use crate::harmonics::SH_C0;
+use crate::scene::Scene;
+use crate::shape::GaussianShape;
 
 /// Gaussians per chunk.
 const CHUNK: usize = 256;

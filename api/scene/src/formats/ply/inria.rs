@@ -6,8 +6,10 @@
 
 use super::table::{Column, Table};
 use crate::error::{Fault, Place, Reason};
+use crate::harmonics::{MAX_SH_DEGREE, sh_coefficients};
 use crate::metadata::Geometry;
-use crate::scene::{GaussianShape, MAX_SH_DEGREE, Scene, sh_coefficients, sigmoid};
+use crate::scene::Scene;
+use crate::shape::{GaussianShape, sigmoid};
 
 const VERTEX: &str = "vertex";
 

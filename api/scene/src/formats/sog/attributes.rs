@@ -10,11 +10,13 @@ use std::f64::consts::FRAC_1_SQRT_2;
 
 use serde::Deserialize;
 
+use super::document::{META, parse};
 use super::files::{Files, Image};
-use super::parse;
 use crate::error::{Fault, Place, Reason};
+use crate::harmonics::sh_coefficients;
 use crate::metadata::{Antialiasing, Geometry, Metadata};
-use crate::scene::{GaussianShape, Scene, sh_coefficients, sigmoid};
+use crate::scene::Scene;
+use crate::shape::{GaussianShape, sigmoid};
 
 /// Entries of a codebook.
 const CODEBOOK: usize = 256;
@@ -143,7 +145,7 @@ struct Palette {
 
 /// Reads the scene of the document `meta`.
 pub(super) fn load(meta: &[u8], files: &Files<'_>) -> Result<Scene, Fault> {
-    let meta: Meta = parse(meta, Place::Entry(super::META.to_owned()))?;
+    let meta: Meta = parse(meta, Place::Entry(META.to_owned()))?;
     let part = |field: &str| Place::Part(format!("meta.json, {field}"));
     let version = meta.version.unwrap_or(1.0);
     let legacy = version == 1.0;

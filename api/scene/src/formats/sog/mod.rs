@@ -4,22 +4,18 @@
 //! document `lod-meta.json` that names such documents, of several levels of detail. The frame is that of PLY files.
 
 mod attributes;
+mod document;
 mod files;
 mod streamed;
 
 use serde::Deserialize;
 
 use super::input::{Format, Input};
-use super::spz::one_line;
-use crate::error::{Fault, Place, Reason};
+use crate::error::{Fault, Place};
 use crate::scene::Scene;
+use document::parse;
+pub(super) use document::{META, STREAMED_META};
 use files::Files;
-
-/// The name of a scene's document.
-pub(super) const META: &str = "meta.json";
-
-/// The name of a streamed scene's document.
-pub(super) const STREAMED_META: &str = "lod-meta.json";
 
 /// The largest document that is read, in bytes.
 const MAX_META: u64 = 1 << 28;
@@ -74,9 +70,4 @@ impl Format for SogFolder {
             attributes::load(&meta, &Files::folder(input.origin(), ""))
         }
     }
-}
-
-/// The JSON document `text`.
-fn parse<'a, T: Deserialize<'a>>(text: &'a [u8], place: Place) -> Result<T, Fault> {
-    serde_json::from_slice(text).map_err(|error| Reason::Json(one_line(&error)).at(place))
 }

@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 
 use serde::Deserialize;
 
+use super::attributes;
+use super::document::{META, parse};
 use super::files::{Files, join};
-use super::{attributes, parse};
 use crate::error::{Fault, Place, Reason};
 use crate::formats::input::Origin;
 use crate::scene::Scene;
@@ -106,7 +107,7 @@ fn unit(name: &str, origin: Origin<'_>) -> Result<Scene, Fault> {
     let read = || {
         if bytes.starts_with(b"PK\x03\x04") {
             let files = Files::archive(&bytes)?;
-            return attributes::load(&files.read(super::META)?, &files);
+            return attributes::load(&files.read(META)?, &files);
         }
         let folder = name.rsplit_once('/').map_or("", |(folder, _)| folder);
         attributes::load(&bytes, &Files::folder(origin, folder))

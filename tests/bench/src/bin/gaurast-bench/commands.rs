@@ -4,8 +4,10 @@ mod work;
 
 use clap::Args;
 
+use crate::callgrind;
+use crate::error::BenchError;
+use crate::median::median;
 use crate::output::Rows;
-use crate::{BenchError, callgrind, median};
 use work::Work;
 
 /// The hidden command that makes a process a worker.

@@ -11,7 +11,11 @@ use super::machine::Machine;
 use super::output::{self, Rows, mebibytes, number};
 use super::roofline::{Roofline, evaluations};
 use super::worker::{Contender, Drawn, Ready, Worker};
-use super::{BenchError, CONTENDERS, FramesArguments, Source, Workload, median};
+use crate::arguments::FramesArguments;
+use crate::error::BenchError;
+use crate::median::median;
+use crate::worker::CONTENDERS;
+use crate::workload::{Source, Workload};
 
 /// What was measured.
 #[derive(Serialize)]

@@ -10,7 +10,11 @@ use super::machine::Machine;
 use super::output::{self, Rows, mebibytes, number};
 use super::plot::{self, Panel, Series};
 use super::worker::{Contender, Worker};
-use super::{BenchError, CONTENDERS, Source, SweepArguments, Workload, median};
+use crate::arguments::SweepArguments;
+use crate::error::BenchError;
+use crate::median::median;
+use crate::worker::CONTENDERS;
+use crate::workload::{Source, Workload};
 
 /// Gaussians where something else grows.
 const COUNT: usize = 100_000;

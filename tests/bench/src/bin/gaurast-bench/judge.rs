@@ -9,8 +9,8 @@ use gaurast_scene::Scene;
 use gaurast_scene::camera::Camera;
 use serde::Serialize;
 
-use super::BenchError;
 use super::worker::read_picture;
+use crate::error::BenchError;
 
 /// Differences of a picture from the oracle's.
 #[derive(Clone, Copy, Debug, Serialize)]

@@ -6,7 +6,7 @@ use comfy_table::presets::UTF8_FULL_CONDENSED;
 use comfy_table::{CellAlignment, Table};
 use serde::Serialize;
 
-use super::BenchError;
+use crate::error::BenchError;
 
 /// Rows of text, with a header: what CSV files and tables show.
 #[derive(Clone, Debug, Default)]

@@ -7,7 +7,9 @@ use gaurast_render::Settings;
 use gaurast_scene::camera::Camera;
 
 use super::worker::{Contender, Drawn, Worker};
-use super::{BenchError, Workload, median};
+use crate::error::BenchError;
+use crate::median::median;
+use crate::workload::Workload;
 
 /// How views are drawn.
 #[derive(Clone, Copy, Debug)]

@@ -12,7 +12,11 @@ use super::machine::Machine;
 use super::output::{self, Rows, number};
 use super::plot::{self, Panel, Series};
 use super::worker::{Contender, Drawn, Worker};
-use super::{BenchError, CONTENDERS, ParetoArguments, Source, SweepArguments, Workload, median};
+use crate::arguments::{ParetoArguments, SweepArguments};
+use crate::error::BenchError;
+use crate::median::median;
+use crate::worker::CONTENDERS;
+use crate::workload::{Source, Workload};
 
 /// A way to draw: who, by which settings, at which part of the resolution.
 #[derive(Clone, Debug, Serialize)]

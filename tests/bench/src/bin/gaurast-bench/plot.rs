@@ -7,7 +7,7 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::{FontStyle, register_font};
 
-use super::BenchError;
+use crate::error::BenchError;
 
 /// A panel's size in pixels.
 const PANEL: [u32; 2] = [560, 420];

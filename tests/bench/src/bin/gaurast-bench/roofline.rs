@@ -10,9 +10,9 @@ use serde::Serialize;
 
 use gaurast_render::Settings;
 
-use super::BenchError;
 use super::worker::{Contender, Drawn, Worker};
 use super::workload::{Source, TILE_GAUSSIANS, Workload};
+use crate::error::BenchError;
 
 /// Tiles of a frame. Rates are those of what the larger has more, so that what a frame takes beside does not count.
 const TILES: [usize; 2] = [4, 20];

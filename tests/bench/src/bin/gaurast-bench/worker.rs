@@ -13,8 +13,8 @@ use gaurast_scene::Scene;
 use gaurast_scene::camera::Camera;
 use serde::{Deserialize, Serialize};
 
-use super::BenchError;
 use super::workload::Workload;
+use crate::error::BenchError;
 
 /// The hidden command that makes a process a worker.
 pub const COMMAND: &str = "worker";
@@ -43,6 +43,13 @@ impl Contender {
         }
     }
 }
+
+/// All contenders, in the order of tables.
+pub const CONTENDERS: [Contender; 3] = [
+    Contender::Gaurast,
+    Contender::QuadsOnLavapipe,
+    Contender::QuadsOnGaurast,
+];
 
 /// What a worker is told first.
 #[derive(Serialize, Deserialize)]

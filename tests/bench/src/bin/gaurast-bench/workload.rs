@@ -8,7 +8,7 @@ use gaurast_scene::camera::{Camera, DEFAULT_FOV, DEFAULT_NEAR, Model};
 use gaurast_scene::{GaussianShape, Scene};
 use serde::{Deserialize, Serialize};
 
-use super::BenchError;
+use crate::error::BenchError;
 
 /// Seed of everything that is generated.
 const SEED: u64 = 1;

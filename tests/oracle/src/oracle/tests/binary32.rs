@@ -3,8 +3,9 @@
 
 use super::*;
 use crate::compare::{Limits, Verdict, verdict};
-use crate::oracle::project::{Splat, project};
+use crate::oracle::project::project;
 use crate::oracle::render_bounded;
+use crate::oracle::splat::Splat;
 use crate::scenes;
 
 /// What a renderer does carelessly.

@@ -4,12 +4,12 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 use clap::ValueEnum;
-use thiserror::Error;
 
+use super::error::{CountsError, Obstacle};
 use super::pictures;
+use super::report::Report;
 use super::stored::{Table, percent};
-use super::workload::Workload;
-use super::{CountsError, Report, WORKER};
+use super::workload::{WORKER, Workload};
 use crate::callgrind::{self, LEVEL};
 use crate::output::Rows;
 use crate::worker::OPTIMIZATIONS;
@@ -19,17 +19,6 @@ const TOLERANCE: f64 = 1.0;
 
 /// The frame that is counted: the first one is cold, and the second one makes chunks of Gaussians.
 const FRAMES: u32 = 3;
-
-/// Why instructions cannot be counted here.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
-pub enum Obstacle {
-    #[error("valgrind is not there")]
-    NoValgrind,
-    #[error("this processor has no AVX2")]
-    NoAvx2,
-    #[error("there is no Vulkan loader")]
-    NoLoader,
-}
 
 /// The first obstacle to counting, if there is one.
 pub(super) fn obstacle() -> Option<Obstacle> {

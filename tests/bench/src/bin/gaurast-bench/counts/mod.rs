@@ -1,9 +1,11 @@
 //! `gaurast-bench counts`: figures that do not depend on what else the machine does, held against stored ones.
 
 mod compute;
+mod error;
 mod instructions;
 mod objects;
 mod pictures;
+mod report;
 mod sizes;
 mod stored;
 mod triangles;
@@ -12,52 +14,15 @@ mod workload;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use gaurast_bench::quads::QuadError;
-use gaurast_render::RenderError;
-use thiserror::Error;
 
-use crate::callgrind::CallgrindError;
-use instructions::Obstacle;
-use workload::Workload;
+use error::Obstacle;
+use report::Report;
 
-/// The hidden command that makes a process a worker.
-pub const WORKER: &str = "counts-worker";
+pub use error::CountsError;
+pub use workload::{WORKER, WorkerArguments};
 
 /// The variable that makes a missing program a failure: `programs` or `all`.
 const REQUIRE: &str = "GAURAST_TEST_REQUIRE";
-
-/// Why the counts could not be made, or are not as stored. Displayed as one sentence.
-#[derive(Debug, Error)]
-pub enum CountsError {
-    #[error(transparent)]
-    Render(#[from] RenderError),
-    #[error(transparent)]
-    Quads(#[from] QuadError),
-    #[error("there is no Vulkan loader: {0}")]
-    NoLoader(String),
-    #[error("a worker could not be started or its files not be read: {0}")]
-    Io(#[from] std::io::Error),
-    #[error("a worker failed: {0}")]
-    Worker(String),
-    #[error(transparent)]
-    Callgrind(#[from] CallgrindError),
-    #[error("the stored row \"{0}\" has too few or too many cells")]
-    Stored(String),
-    #[error("the program's symbols cannot be read: {0}")]
-    Object(#[from] object::Error),
-    #[error("the program's debug information cannot be read: {0}")]
-    Dwarf(#[from] gimli::Error),
-    #[error("the program has no symbols: build it without stripping")]
-    Stripped,
-    #[error(
-        "the stored counts are those of the profiling profile, and this program has debug assertions"
-    )]
-    Profile,
-    #[error("{0}")]
-    Required(Obstacle),
-    #[error("{0} of the counts are not as stored")]
-    Differs(usize),
-}
 
 /// Arguments of the counts.
 #[derive(Args)]
@@ -88,36 +53,6 @@ enum Part {
     Pictures,
     /// Bytes of the device's functions
     Sizes,
-}
-
-/// Arguments of a worker.
-#[derive(Args)]
-pub struct WorkerArguments {
-    /// The workload
-    #[arg(value_enum, required = true)]
-    workloads: Vec<Workload>,
-
-    /// Frames of each
-    #[arg(long)]
-    frames: u32,
-
-    /// Draws on the loader's first device instead of the embedded one
-    #[arg(long)]
-    through_the_loader: bool,
-}
-
-/// The failures of a check.
-#[derive(Default)]
-struct Report {
-    failures: usize,
-}
-
-impl Report {
-    /// Tells a failure.
-    fn fail(&mut self, text: String) {
-        println!("FAILED: {text}");
-        self.failures += 1;
-    }
 }
 
 /// Makes the counts, and holds them against the stored ones.

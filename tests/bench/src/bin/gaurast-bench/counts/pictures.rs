@@ -5,9 +5,10 @@ use std::process::Command;
 
 use clap::ValueEnum;
 
+use super::error::CountsError;
+use super::report::Report;
 use super::stored::Table;
-use super::workload::Workload;
-use super::{CountsError, Report, WORKER};
+use super::workload::{WORKER, Workload};
 use crate::worker::OPTIMIZATIONS;
 
 /// The SIMD levels of `GAURAST_SIMD`.

@@ -8,8 +8,9 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use gimli::{AttributeValue, DebuggingInformationEntry, EndianSlice, LittleEndian, Unit};
 use object::{Object, ObjectSection, ObjectSymbol, SymbolKind};
 
+use super::error::CountsError;
+use super::report::Report;
 use super::stored::{Table, percent};
-use super::{CountsError, Report};
 use crate::output::Rows;
 
 /// Percent by which a sum may differ from the stored one.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::CountsError;
+use super::error::CountsError;
 
 /// A table of rows by name. A name may have several parts, the first cells of a row.
 pub(super) struct Table {

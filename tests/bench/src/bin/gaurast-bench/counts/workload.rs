@@ -5,15 +5,15 @@
 //! between machines. They are rounded to binary32 afterwards, so that such a difference seldom remains.
 
 use ash::Entry;
-use clap::ValueEnum;
+use clap::{Args, ValueEnum};
 use gaurast_bench::quads::QuadRenderer;
 use gaurast_render::Renderer;
 use gaurast_scene::Scene;
 use gaurast_scene::camera::Camera;
 
 use super::compute::Bodies;
+use super::error::CountsError;
 use super::triangles::Triangles;
-use super::{CountsError, WorkerArguments};
 
 /// The pictures' size in pixels.
 const SIZE: [u32; 2] = [640, 360];
@@ -44,6 +44,25 @@ pub(super) enum Workload {
     BlendedQuads,
     /// A dispatch with workgroup memory
     Compute,
+}
+
+/// The hidden command that makes a process a worker.
+pub const WORKER: &str = "counts-worker";
+
+/// Arguments of a worker.
+#[derive(Args)]
+pub struct WorkerArguments {
+    /// The workload
+    #[arg(value_enum, required = true)]
+    workloads: Vec<Workload>,
+
+    /// Frames of each
+    #[arg(long)]
+    frames: u32,
+
+    /// Draws on the loader's first device instead of the embedded one
+    #[arg(long)]
+    through_the_loader: bool,
 }
 
 impl Workload {

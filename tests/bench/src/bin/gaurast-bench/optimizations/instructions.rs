@@ -3,13 +3,14 @@
 use std::collections::HashMap;
 use std::io::{Write, stdout};
 
-use super::{Path, TEMPORAL_REUSE};
+use super::path::{Path, TEMPORAL_REUSE, settings};
+use crate::arguments::OptimizationsArguments;
 use crate::callgrind;
 use crate::counts;
+use crate::error::BenchError;
 use crate::output::{self, Rows, number};
 use crate::worker;
 use crate::workload::{Extra, Source, Workload};
-use crate::{BenchError, OptimizationsArguments};
 
 /// The pictures' size.
 const SIZE: [u32; 2] = [640, 360];
@@ -162,7 +163,7 @@ pub(super) fn run(arguments: &OptimizationsArguments) -> Result<(), BenchError> 
             known.insert(key, count);
             Ok(count)
         };
-        let [with, without] = super::settings(optimization);
+        let [with, without] = settings(optimization);
         let (with, without) = (count(with)?, count(without)?);
         rows.rows.push(vec![
             optimization.to_owned(),

@@ -1,17 +1,21 @@
 //! `gaurast-bench optimizations`: what each optimization saves, and what Gaussians cost that nobody sees.
 
 mod instructions;
+mod path;
 
 use std::io::{Write, stdout};
 
-use gaurast_scene::camera::Camera;
 use serde::Serialize;
 
+use self::path::DRAWS;
 use super::machine::Machine;
 use super::output::{self, Rows, number};
 use super::pair::{Draws, Pair, time};
 use super::worker::OPTIMIZATIONS;
-use super::{BenchError, Extra, OptimizationsArguments, Source, Workload};
+use crate::arguments::OptimizationsArguments;
+use crate::error::BenchError;
+use crate::workload::{Extra, Source, Workload};
+use path::{Path, TEMPORAL_REUSE, settings};
 
 /// Optimizations of Gaussian draws, and the counter of each, as the device has them.
 const COUNTERS: [(&str, &str); 9] = [
@@ -25,51 +29,6 @@ const COUNTERS: [(&str, &str); 9] = [
     ("empty-tiles", "tiles untouched"),
     (TEMPORAL_REUSE, "sets unchanged"),
 ];
-
-/// What only a still camera shows.
-const TEMPORAL_REUSE: &str = "temporal-reuse";
-
-/// How a camera goes from frame to frame.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Path {
-    /// As the workload says, which is far enough for nothing of the last frame to help.
-    Own,
-    Still,
-    /// The workload's, five times as far away.
-    Afar,
-}
-
-impl Path {
-    /// The one that shows an optimization.
-    fn of(optimization: &str) -> Self {
-        match optimization {
-            TEMPORAL_REUSE => Self::Still,
-            _ => Self::Own,
-        }
-    }
-
-    /// The views of so many frames.
-    fn views(self, workload: &Workload, frames: usize) -> Result<Vec<Camera>, BenchError> {
-        let own = workload.views(&workload.scene()?, frames)?;
-        let view = |frame: usize| {
-            let goes_on = matches!(self, Self::Own | Self::Afar);
-            let mut view = own[if goes_on { frame } else { 0 }].clone();
-            if self == Self::Afar {
-                view.eye = view.eye.map(|part| 5.0 * part);
-            }
-            view
-        };
-        Ok((0..frames).map(view).collect())
-    }
-
-    /// How its views are drawn.
-    fn draws(self) -> Draws {
-        match self {
-            Self::Own | Self::Afar => Draws::Again(DRAWS),
-            Self::Still => Draws::Once,
-        }
-    }
-}
 
 /// The pictures' size.
 const SIZE: [u32; 2] = [1280, 720];
@@ -122,9 +81,6 @@ const UNSEEN_PER_SEEN: usize = 10;
 
 /// How many times as many views their cost is found from as what an optimization saves.
 const UNSEEN_VIEWS_PER_RUN: usize = 2;
-
-/// How often a view is drawn, if that changes nothing.
-const DRAWS: usize = 3;
 
 /// Runs the comparison.
 pub(super) fn run(arguments: &OptimizationsArguments) -> Result<(), BenchError> {
@@ -246,21 +202,6 @@ fn saved_by(
         without,
         share: pair.quartiles(time, |with, without| 100.0 * (1.0 - with / without)),
     })
-}
-
-/// What the driver leaves out with an optimization and without it. What saves from frame to frame is on alone, where that is asked
-/// for: it would hide what others save.
-fn settings(optimization: &str) -> [String; 2] {
-    match Path::of(optimization) {
-        Path::Own | Path::Afar => [
-            OPTIMIZATIONS.to_owned(),
-            format!("{OPTIMIZATIONS},-{optimization}"),
-        ],
-        Path::Still => [
-            OPTIMIZATIONS.replace(&format!(",-{optimization}"), ""),
-            OPTIMIZATIONS.to_owned(),
-        ],
-    }
 }
 
 fn unseen(

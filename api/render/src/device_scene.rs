@@ -1,0 +1,16 @@
+//! Scenes in device memory.
+
+use crate::pipeline::{BINDINGS, GaussianPipeline};
+use crate::resource::Buffer;
+use crate::settings::Settings;
+
+/// A scene in device memory, with its pipeline.
+pub struct DeviceScene {
+    pub(crate) count: u32,
+    pub(crate) strides: [u32; BINDINGS],
+    pub(crate) stored_degree: u32,
+    pub(crate) settings: Settings,
+    pub(crate) pipeline: GaussianPipeline,
+    /// One for each of [`BINDINGS`].
+    pub(crate) buffers: [Buffer; BINDINGS],
+}

@@ -1,0 +1,280 @@
+//! The renderer: scenes to device memory, and frames of them to the host.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use ash::vk;
+use gaurast::gaussian_primitive_topology;
+use gaurast_picture::Picture;
+use gaurast_scene::{Camera, GaussianShape, MAX_SH_DEGREE, Scene};
+
+use crate::device::{Device, Purpose};
+use crate::device_scene::DeviceScene;
+use crate::draw::{DepthScale, Recorder};
+use crate::error::RenderError;
+use crate::pipeline::{BINDINGS, GaussianPipeline};
+use crate::process_stats::processor_time;
+use crate::query::{Counter, CounterQuery};
+use crate::resource::{Buffer, CommandBuffers, Memory};
+use crate::settings::Settings;
+use crate::target::{COLOR_FORMAT, Target, check_size, record_copy};
+
+/// Bytes that go to the device at once.
+const STAGING: u64 = 64 << 20;
+
+/// A device that draws Gaussians, and what it needs from frame to frame.
+pub struct Renderer {
+    query: Option<CounterQuery>,
+    target: Option<Target>,
+    commands: CommandBuffers<2>,
+    gaussian: gaussian_primitive_topology::Device,
+    device: Arc<Device>,
+}
+
+/// A rendered picture and what it cost.
+#[derive(Clone, Debug)]
+pub struct Frame {
+    /// (C, 1 - T) of every pixel, over nothing.
+    pub picture: Picture,
+    /// From the submission to its end, the copy to the host included.
+    pub time: Duration,
+    /// What all threads of the process spent meanwhile, if the system tells.
+    pub processor_time: Option<Duration>,
+    /// The device's counters of the draw, in its order; none if it has none.
+    pub counters: Vec<Counter>,
+    /// The expected and the median depth of every pixel, if the settings keep them; infinite where nothing is.
+    ///
+    /// Depth is the distance along the camera's axis, or from the eye for a fisheye and a panorama. The expected depth
+    /// is the reciprocal of the mean reciprocal, weighted as colours are (the mean itself for parallel rays); the
+    /// median is that of the Gaussian at which half of the light is gone, or of the last one.
+    pub depth: Option<Vec<[f32; 2]>>,
+}
+
+impl Renderer {
+    /// A renderer on the first device of `entry` that draws Gaussians.
+    ///
+    /// # Errors
+    /// If there is none, or Vulkan fails.
+    pub fn new(entry: ash::Entry) -> Result<Self, RenderError> {
+        let device = Arc::new(Device::new(entry, Purpose::Gaussians)?);
+        Ok(Self {
+            query: CounterQuery::new(&device, false)?,
+            target: None,
+            commands: CommandBuffers::new(&device)?,
+            gaussian: device.gaussian_functions(),
+            device,
+        })
+    }
+
+    /// Counts also what changes how long things take, such as what simulated hardware would spend.
+    ///
+    /// # Errors
+    /// If Vulkan fails.
+    pub fn count_everything(&mut self) -> Result<(), RenderError> {
+        // A device has one profiling lock.
+        self.query = None;
+        self.query = CounterQuery::new(&self.device, true)?;
+        Ok(())
+    }
+
+    /// The device's name.
+    pub fn device_name(&self) -> &str {
+        self.device.name()
+    }
+
+    /// Copies `scene` to the device. Its colours are drawn with the spherical harmonics degree that
+    /// it stores, or `sh_degree`, or the device's greatest, whichever is least.
+    ///
+    /// # Errors
+    /// If the scene is too large for the device, or Vulkan fails.
+    pub fn upload(
+        &mut self,
+        scene: &Scene,
+        sh_degree: Option<u32>,
+    ) -> Result<DeviceScene, RenderError> {
+        let settings = Settings {
+            sh_degree: sh_degree.unwrap_or(MAX_SH_DEGREE),
+            ..Settings::default()
+        };
+        let max = self.device.max_gaussians().min(u32::MAX.into());
+        let count = scene.len() as u64;
+        if count > max {
+            return Err(RenderError::TooMany { count, max });
+        }
+        let strides = [
+            size_of::<[f32; 3]>(),
+            size_of::<GaussianShape>(),
+            scene.sh_stride() * size_of::<[f32; 3]>(),
+        ]
+        .map(|stride| stride as u32);
+        Ok(DeviceScene {
+            count: count as u32,
+            strides,
+            stored_degree: scene.sh_degree(),
+            settings,
+            pipeline: self.pipeline(strides, scene.sh_degree(), settings)?,
+            buffers: [
+                self.upload_bytes(bytemuck::cast_slice(scene.positions()))?,
+                self.upload_bytes(bytemuck::cast_slice(scene.shapes()))?,
+                self.upload_bytes(bytemuck::cast_slice(scene.sh()))?,
+            ],
+        })
+    }
+
+    /// Draws `scene` once, as `camera` sees it, by 3DGS's settings.
+    ///
+    /// # Errors
+    /// As [`Renderer::upload`] and [`Renderer::render`].
+    pub fn draw(&mut self, scene: &Scene, camera: &Camera) -> Result<Picture, RenderError> {
+        let scene = self.upload(scene, None)?;
+        Ok(self.render(&scene, camera)?.picture)
+    }
+
+    /// Draws `scene` by other settings from now on.
+    ///
+    /// # Errors
+    /// If Vulkan fails.
+    pub fn set(&self, scene: &mut DeviceScene, settings: Settings) -> Result<(), RenderError> {
+        scene.pipeline = self.pipeline(scene.strides, scene.stored_degree, settings)?;
+        scene.settings = settings;
+        Ok(())
+    }
+
+    fn pipeline(
+        &self,
+        strides: [u32; BINDINGS],
+        stored_degree: u32,
+        mut settings: Settings,
+    ) -> Result<GaussianPipeline, RenderError> {
+        settings.sh_degree = settings
+            .sh_degree
+            .min(stored_degree)
+            .min(self.device.max_sh_degree());
+        GaussianPipeline::new(&self.device, strides, settings, COLOR_FORMAT)
+    }
+
+    /// A device-local vertex buffer of `bytes`, by way of a staging buffer.
+    fn upload_bytes(&mut self, bytes: &[u8]) -> Result<Buffer, RenderError> {
+        use vk::BufferUsageFlags as Usage;
+        let usage = Usage::VERTEX_BUFFER | Usage::TRANSFER_DST;
+        // Vulkan has no empty buffers; an empty scene is drawn with none of this read.
+        let size = (bytes.len() as u64).max(4);
+        let buffer = Buffer::new(&self.device, size, usage, Memory::Device)?;
+        let staging_size = size.min(STAGING);
+        let staging = Buffer::new(
+            &self.device,
+            staging_size,
+            Usage::TRANSFER_SRC,
+            Memory::Host,
+        )?;
+        let mut offset = 0;
+        for chunk in bytes.chunks(staging_size as usize) {
+            staging.write(chunk)?;
+            let region = vk::BufferCopy::default()
+                .dst_offset(offset)
+                .size(chunk.len() as u64);
+            self.commands.record(0, |device, commands| {
+                // SAFETY: the command buffer is recording, and the regions lie within both
+                // buffers, which live until the submission below has ended.
+                unsafe {
+                    device.cmd_copy_buffer(commands, staging.handle(), buffer.handle(), &[region]);
+                }
+                // The next submission's draws read it as vertices.
+                let barrier = vk::MemoryBarrier::default()
+                    .src_access_mask(vk::AccessFlags::TRANSFER_WRITE)
+                    .dst_access_mask(vk::AccessFlags::VERTEX_ATTRIBUTE_READ);
+                // SAFETY: the command buffer is recording, outside a render pass.
+                unsafe {
+                    device.cmd_pipeline_barrier(
+                        commands,
+                        vk::PipelineStageFlags::TRANSFER,
+                        vk::PipelineStageFlags::VERTEX_INPUT,
+                        vk::DependencyFlags::empty(),
+                        &[barrier],
+                        &[],
+                        &[],
+                    );
+                }
+            })?;
+            self.commands.submit_and_wait(&[0])?;
+            offset += chunk.len() as u64;
+        }
+        Ok(buffer)
+    }
+
+    /// Draws `scene` as `camera` sees it, in a picture of the camera's size.
+    ///
+    /// # Errors
+    /// If the size is not within the device's limits, modes don't go together, or Vulkan fails.
+    pub fn render(&mut self, scene: &DeviceScene, camera: &Camera) -> Result<Frame, RenderError> {
+        let (width, height) = (camera.width, camera.height);
+        check_size(&self.device, width, height)?;
+        scene.settings.check(camera)?;
+        let depth = scene.settings.depth;
+        let target = match self.target.take() {
+            Some(target)
+                if target.image.extent() == vk::Extent2D { width, height }
+                    && target.depths.is_some() == depth =>
+            {
+                target
+            }
+            _ => Target::with_depths(&self.device, width, height, depth)?,
+        };
+        let target = self.target.insert(target);
+
+        // A query is not reset in the submission that it begins in, and it spans a whole command
+        // buffer, so that counters of any scope will do.
+        if let Some(query) = &self.query {
+            self.commands
+                .record(0, |_, commands| query.reset(commands))?;
+            self.commands.submit_and_wait(&[0])?;
+        }
+        self.commands.record(0, |_, commands| {
+            if let Some(query) = &self.query {
+                query.begin(commands);
+            }
+            let recorder = Recorder {
+                device: &self.device,
+                gaussian: &self.gaussian,
+                commands,
+            };
+            recorder.record(target, scene, camera);
+            if let Some(query) = &self.query {
+                query.end(commands);
+            }
+        })?;
+        self.commands
+            .record(1, |_, commands| record_copy(&self.device, commands, target))?;
+        let (start, processor) = (Instant::now(), processor_time());
+        self.commands.submit_and_wait(&[0, 1])?;
+        let time = start.elapsed();
+        let processor_time = processor.and_then(|start| Some(processor_time()? - start));
+
+        let pixels: Vec<[f32; 4]> = (target.readback).read_new(width as usize * height as usize)?;
+        let depth = match &target.depths {
+            None => None,
+            Some((_, readback)) => {
+                let mut depths = vec![[0.0; 2]; width as usize * height as usize];
+                readback.read(&mut depths)?;
+                let scale = DepthScale::of(camera);
+                for (depths, [.., alpha]) in depths.iter_mut().zip(&pixels) {
+                    let reached = *alpha > 0.0;
+                    *depths = depths.map(|value| scale.depth(if reached { value } else { 0.0 }));
+                }
+                Some(depths)
+            }
+        };
+        let counters = self.query.as_ref().map(CounterQuery::read).transpose()?;
+        Ok(Frame {
+            picture: Picture {
+                width,
+                height,
+                pixels,
+            },
+            time,
+            processor_time,
+            counters: counters.unwrap_or_default(),
+            depth,
+        })
+    }
+}

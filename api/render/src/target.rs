@@ -1,0 +1,133 @@
+//! What a frame is drawn to, and how it comes to the host.
+
+use std::sync::Arc;
+
+use ash::vk;
+
+use crate::device::Device;
+use crate::error::RenderError;
+use crate::resource::{Buffer, Image, Memory};
+
+/// The colour attachment's format: what a draw leaves is kept as it is.
+pub const COLOR_FORMAT: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
+
+/// The format of the attachment of expected and median depths.
+pub(crate) const DEPTHS_FORMAT: vk::Format = vk::Format::R32G32_SFLOAT;
+
+/// Where a frame goes.
+pub struct Target {
+    /// The colour attachment.
+    pub image: Image,
+    /// Room for the pixels in memory of the host.
+    pub readback: Buffer,
+    /// The attachment of depths and the room for them, if there are some.
+    pub(crate) depths: Option<(Image, Buffer)>,
+}
+
+/// Checks that the device can draw a picture of this size.
+///
+/// # Errors
+/// [`RenderError::Size`] if it cannot.
+pub fn check_size(device: &Device, width: u32, height: u32) -> Result<(), RenderError> {
+    let max = device.max_size();
+    if !(1..=max).contains(&width) || !(1..=max).contains(&height) {
+        return Err(RenderError::Size { width, height, max });
+    }
+    Ok(())
+}
+
+impl Target {
+    /// A target of [`COLOR_FORMAT`].
+    ///
+    /// # Errors
+    /// If there is no memory for it, or Vulkan fails.
+    pub fn new(device: &Arc<Device>, width: u32, height: u32) -> Result<Self, RenderError> {
+        Self::with_depths(device, width, height, false)
+    }
+
+    pub(crate) fn with_depths(
+        device: &Arc<Device>,
+        width: u32,
+        height: u32,
+        depth: bool,
+    ) -> Result<Self, RenderError> {
+        let extent = vk::Extent2D { width, height };
+        let image = |format| {
+            let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT
+                | vk::ImageUsageFlags::TRANSFER_SRC
+                | vk::ImageUsageFlags::TRANSFER_DST;
+            Image::new(device, extent, format, usage)
+        };
+        let readback = |pixel: usize| {
+            let bytes = u64::from(width) * u64::from(height) * pixel as u64;
+            let usage = vk::BufferUsageFlags::TRANSFER_DST;
+            Buffer::new(device, bytes, usage, Memory::HostCached)
+        };
+        Ok(Self {
+            image: image(COLOR_FORMAT)?,
+            readback: readback(size_of::<[f32; 4]>())?,
+            depths: if depth {
+                Some((image(DEPTHS_FORMAT)?, readback(size_of::<[f32; 2]>())?))
+            } else {
+                None
+            },
+        })
+    }
+}
+
+/// Copies the drawn picture to the buffer that the host reads, and depths if there are some.
+pub fn record_copy(device: &Device, commands: vk::CommandBuffer, target: &Target) {
+    copy_image(device, commands, &target.image, &target.readback);
+    if let Some((image, readback)) = &target.depths {
+        copy_image(device, commands, image, readback);
+    }
+}
+
+fn copy_image(device: &Device, commands: vk::CommandBuffer, image: &Image, readback: &Buffer) {
+    let to_source = image
+        .barrier(
+            vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
+            vk::ImageLayout::TRANSFER_SRC_OPTIMAL,
+        )
+        .src_access_mask(vk::AccessFlags::COLOR_ATTACHMENT_WRITE)
+        .dst_access_mask(vk::AccessFlags::TRANSFER_READ);
+    let layers = vk::ImageSubresourceLayers::default()
+        .aspect_mask(vk::ImageAspectFlags::COLOR)
+        .layer_count(1);
+    let region = vk::BufferImageCopy::default()
+        .image_subresource(layers)
+        .image_extent(image.extent().into());
+    let to_host = vk::MemoryBarrier::default()
+        .src_access_mask(vk::AccessFlags::TRANSFER_WRITE)
+        .dst_access_mask(vk::AccessFlags::HOST_READ);
+    let raw = device.raw();
+    // SAFETY: the command buffer is recording; the buffer holds the whole image without gaps, and
+    // both live until the submission has ended.
+    unsafe {
+        raw.cmd_pipeline_barrier(
+            commands,
+            vk::PipelineStageFlags::COLOR_ATTACHMENT_OUTPUT,
+            vk::PipelineStageFlags::TRANSFER,
+            vk::DependencyFlags::empty(),
+            &[],
+            &[],
+            &[to_source],
+        );
+        raw.cmd_copy_image_to_buffer(
+            commands,
+            image.handle(),
+            vk::ImageLayout::TRANSFER_SRC_OPTIMAL,
+            readback.handle(),
+            &[region],
+        );
+        raw.cmd_pipeline_barrier(
+            commands,
+            vk::PipelineStageFlags::TRANSFER,
+            vk::PipelineStageFlags::HOST,
+            vk::DependencyFlags::empty(),
+            &[to_host],
+            &[],
+            &[],
+        );
+    }
+}

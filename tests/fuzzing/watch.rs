@@ -1,0 +1,39 @@
+//! How many runs there are, and what panics in them.
+
+use std::ops::Range;
+use std::sync::{Mutex, PoisonError};
+
+use gaurast_runner::Case;
+
+/// What panicked, in whatever thread: the driver catches panics, so that an application never sees them.
+static PANICS: Mutex<Vec<String>> = Mutex::new(Vec::new());
+
+/// Keeps all panics of this process from now on, and prints them with where they come from.
+pub fn watch_panics() {
+    std::panic::set_hook(Box::new(|info| {
+        eprintln!("{info}\n{}", std::backtrace::Backtrace::force_capture());
+        let mut panics = PANICS.lock().unwrap_or_else(PoisonError::into_inner);
+        panics.push(info.to_string());
+    }));
+}
+
+/// The panics since the last call.
+pub fn panics() -> Vec<String> {
+    std::mem::take(&mut *PANICS.lock().unwrap_or_else(PoisonError::into_inner))
+}
+
+/// The numbers of the runs that are a shard's, of as many as `GAURAST_FUZZ_RUNS` says, or `usual`.
+pub fn runs(case: &Case, usual: u64) -> Range<u64> {
+    let number = |variable, otherwise| match std::env::var(variable) {
+        Ok(text) => text.parse().expect("a number"),
+        Err(_) => otherwise,
+    };
+    let first: u64 = number("GAURAST_FUZZ_FIRST", 0);
+    let Range { start, end } = case.shard().range(number("GAURAST_FUZZ_RUNS", usual));
+    first + start..first + end
+}
+
+/// Reports whether so many runs are enough for all outcomes.
+pub fn are_many(runs: &Range<u64>) -> bool {
+    runs.end - runs.start >= 100
+}

@@ -1,0 +1,4 @@
+//! What tests need of the system.
+
+/// The compiler of the shaders that are written in GLSL.
+pub const GLSLANG: gaurast_runner::Need = gaurast_runner::Need::Program("glslangValidator");

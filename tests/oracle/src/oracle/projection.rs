@@ -1,0 +1,84 @@
+//! Cameras: where a point is in the picture, and how that moves with the point.
+
+use super::panorama;
+use super::vectors::{dot, length};
+use super::{OracleCamera, OracleModel};
+
+/// The mean of a camera's picture of a point in camera axes, and the Jacobian there.
+pub(super) fn mean_and_jacobian(camera: &OracleCamera, t: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
+    match camera.model {
+        OracleModel::Pinhole => pinhole(camera, t),
+        OracleModel::Orthographic => orthographic(camera, t),
+        OracleModel::Fisheye => fisheye(camera, t),
+        OracleModel::Equirectangular => panorama::equirectangular(camera, t),
+    }
+}
+
+/// The depth variable of a point in camera axes.
+pub(super) fn depth_variable(model: OracleModel, t: [f64; 3]) -> f64 {
+    match model {
+        OracleModel::Pinhole | OracleModel::Orthographic => t[2],
+        OracleModel::Fisheye | OracleModel::Equirectangular => length(t),
+    }
+}
+
+/// The mean and the Jacobian of perspective, whose point is kept near the viewport.
+fn pinhole(camera: &OracleCamera, t: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
+    let [fx, fy] = camera.focal.map(f64::from);
+    let [cx, cy] = camera.principal.map(f64::from);
+    let (width, height) = (f64::from(camera.width), f64::from(camera.height));
+    let (tan_x, tan_y) = (t[0] / t[2], t[1] / t[2]);
+    let u = tan_x
+        .max(-(cx / fx + 0.15 * width / fx))
+        .min((width - cx) / fx + 0.15 * width / fx);
+    let v = tan_y
+        .max(-(cy / fy + 0.15 * height / fy))
+        .min((height - cy) / fy + 0.15 * height / fy);
+    let jacobian = [
+        [fx / t[2], 0.0, -fx * u / t[2]],
+        [0.0, fy / t[2], -fy * v / t[2]],
+    ];
+    ([fx * tan_x + cx, fy * tan_y + cy], jacobian)
+}
+
+/// The mean and the Jacobian of parallel projection.
+fn orthographic(camera: &OracleCamera, t: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
+    let [fx, fy] = camera.focal.map(f64::from);
+    let [cx, cy] = camera.principal.map(f64::from);
+    let jacobian = [[fx, 0.0, 0.0], [0.0, fy, 0.0]];
+    ([fx * t[0] + cx, fy * t[1] + cy], jacobian)
+}
+
+/// The mean and the Jacobian of the equidistant fisheye, by the chain rule from r = |t.xy| and a = atan2(r, t.z).
+fn fisheye(camera: &OracleCamera, t: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
+    let r = (t[0] * t[0] + t[1] * t[1]).sqrt();
+    let square = dot(t, t);
+    let angle = r.atan2(t[2]);
+    let focal = camera.focal.map(f64::from);
+    let principal = camera.principal.map(f64::from);
+    // On the axis the limits: nothing moves but across it, by 1 / t.z.
+    if r == 0.0 {
+        let scale = if t[2] > 0.0 { 1.0 / t[2] } else { f64::NAN };
+        return (
+            principal,
+            [[focal[0] * scale, 0.0, 0.0], [0.0, focal[1] * scale, 0.0]],
+        );
+    }
+    let row = |axis: usize| {
+        // The place is f (a / r) t[axis]; a / r has the gradient (a' r - a r') / r^2.
+        let gradient: [f64; 3] = std::array::from_fn(|k| {
+            let r_k = if k < 2 { t[k] / r } else { 0.0 };
+            let a_k = if k < 2 {
+                t[2] * t[k] / (r * square)
+            } else {
+                -r / square
+            };
+            let of_ratio = (a_k * r - angle * r_k) / (r * r);
+            let own = if k == axis { angle / r } else { 0.0 };
+            of_ratio * t[axis] + own
+        });
+        gradient.map(|g| focal[axis] * g)
+    };
+    let mean = [0, 1].map(|axis| focal[axis] * angle / r * t[axis] + principal[axis]);
+    (mean, [row(0), row(1)])
+}

@@ -1,0 +1,131 @@
+//! A projected Gaussian, and step 6: its alpha at a pixel centre.
+
+use super::OracleState;
+use super::error_model::ErrorModel;
+use super::own_axes::OwnAxes;
+use super::panorama;
+use super::surfel::Surfel;
+
+/// A Gaussian as the pixels see it.
+#[derive(Clone, Copy, Debug)]
+pub struct Splat {
+    /// Centre in pixels from the viewport's upper left corner, not clamped to it.
+    pub mean: [f64; 2],
+    /// Covariance `xx, xy, yy` in px^2, low-pass filter included.
+    pub covariance: [f64; 3],
+    /// Its determinant, evaluated without cancellation.
+    pub determinant: f64,
+    /// After how many pixels the picture repeats to the right and to the left, or infinity.
+    pub period: f64,
+    /// The factor with which the quadratic form is evaluated.
+    pub cholesky: Cholesky,
+    /// Opacity, compensated if the state says so.
+    pub opacity: f64,
+    /// Colour, at least 0.
+    pub color: [f64; 3],
+    /// What it is sorted by, rounded to binary32.
+    pub key: f32,
+    /// The depth variable, rounded to binary32. (With vertex-shader projection the depth, rounded so.)
+    pub z: f32,
+    /// The depth of its centre, of which a pixel has a mean; zero until somebody asks for that.
+    pub depth: f64,
+    /// What it is in space, if that is a disc.
+    pub surfel: Option<Surfel>,
+    /// What its depth along rays comes from.
+    pub own_axes: OwnAxes,
+    /// Whether the key is within its own error of the middle between two keys.
+    pub key_undecidable: bool,
+    /// How far a binary32 implementation may err on this Gaussian.
+    pub error: ErrorModel,
+}
+
+/// Lower triangular factor of a 2x2 covariance, pivoted on its larger diagonal element.
+#[derive(Clone, Copy, Debug)]
+pub struct Cholesky {
+    /// Whether y comes first.
+    pub swapped: bool,
+    /// The factor's elements `l11, l21, l22`.
+    pub l: [f64; 3],
+}
+
+impl Cholesky {
+    /// Factors `[xx, xy, yy]`. The last pivot comes from the determinant, not from a difference.
+    pub(super) fn new([xx, xy, yy]: [f64; 3], determinant: f64) -> Self {
+        let swapped = yy > xx;
+        let larger = if swapped { yy } else { xx };
+        let l11 = larger.sqrt();
+        Self {
+            swapped,
+            l: [l11, xy / l11, (determinant / larger).sqrt()],
+        }
+    }
+
+    /// `q = d^T S^-1 d` as a sum of two squares, and `w = S^-1 d`.
+    pub fn solve(&self, d: [f64; 2]) -> (f64, [f64; 2]) {
+        let [l11, l21, l22] = self.l;
+        let (first, second) = if self.swapped {
+            (d[1], d[0])
+        } else {
+            (d[0], d[1])
+        };
+        let y1 = first / l11;
+        let y2 = (second - l21 * y1) / l22;
+        let w2 = y2 / l22;
+        let w1 = (y1 - l21 * w2) / l11;
+        let w = if self.swapped { [w2, w1] } else { [w1, w2] };
+        (y1 * y1 + y2 * y2, w)
+    }
+}
+
+/// Alpha of a Gaussian at a pixel.
+#[derive(Clone, Copy, Debug)]
+pub struct Alpha {
+    /// Step 6's value, ceiling applied.
+    pub value: f64,
+    /// How far a binary32 implementation may be from it.
+    pub error: f64,
+}
+
+impl Alpha {
+    const NOTHING: Self = Self {
+        value: 0.0,
+        error: 0.0,
+    };
+}
+
+impl Splat {
+    /// Step 6 at the centre of pixel (x, y).
+    pub fn alpha(&self, x: u32, y: u32, state: &OracleState) -> Alpha {
+        let dx = f64::from(x) + 0.5 - self.mean[0];
+        let Some(dx) = panorama::nearest(dx, self.period) else {
+            return Alpha::NOTHING;
+        };
+        let d = [dx, f64::from(y) + 0.5 - self.mean[1]];
+        let (q, relative) = match &self.surfel {
+            Some(surfel) => surfel.distance([f64::from(x) + 0.5, f64::from(y) + 0.5]),
+            None => {
+                let (q, w) = self.cholesky.solve(d);
+                (q, self.error.alpha(w, q))
+            }
+        };
+        let unclamped = self.opacity * (-0.5 * q).exp();
+        let error = unclamped * relative;
+        let ceiling = f64::from(state.alpha_ceiling);
+        if unclamped - error > ceiling {
+            Alpha {
+                value: ceiling,
+                error: 0.0,
+            }
+        } else if unclamped > ceiling {
+            Alpha {
+                value: ceiling,
+                error,
+            }
+        } else {
+            Alpha {
+                value: unclamped,
+                error,
+            }
+        }
+    }
+}

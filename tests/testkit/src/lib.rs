@@ -1,0 +1,53 @@
+//! The Vulkan application that all tests are.
+//!
+//! | module | has |
+//! |---|---|
+//! | [`gpu`] | devices of this driver, linked or loaded, and of lavapipe: at a SIMD level, with a number of threads; recording and submission |
+//! | [`resource`] | buffers, images with upload and readback, samplers |
+//! | [`descriptors`] | descriptor sets |
+//! | [`pipeline`] | graphics pipelines, of triangles and of Gaussians, and compute pipelines |
+//! | [`pass`] | how passes begin and end |
+//! | [`target`] | attachments, and [pictures](output) of all that they hold |
+//! | [`gaussians`] | Gaussians in vertex buffers, and pipelines that draw them |
+//! | [`difference`] | how the pictures of two devices differ |
+//!
+//! `unsafe` has one reason throughout: these are Vulkan calls on objects of one [`Gpu`], which every resource keeps
+//! alive, and every submission is waited for before a resource can go. What tests record stays within Vulkan's valid
+//! usage (`VK_INSTANCE_LAYERS=VK_LAYER_KHRONOS_validation` shows where it doesn't), unless a test is about what becomes
+//! of it otherwise.
+
+pub mod descriptors;
+pub mod difference;
+pub mod for_levels;
+pub mod gaussians;
+pub mod gpu;
+pub mod loader;
+pub mod messages;
+mod open;
+pub mod output;
+pub mod pass;
+pub mod pipeline;
+pub mod resource;
+pub mod settings;
+pub mod shader;
+pub mod target;
+
+pub use descriptors::{Binding, Bindings, Resource, Sets};
+pub use difference::{Difference, difference, differences, for_people, write_differences};
+pub use gaussians::{
+    GaussianOptions, GaussianPipeline, GaussianScene, Instance, bind_instances, over,
+};
+pub use gpu::{Commands, Driver, Gpu, OpenError, Opening, Recorded};
+pub use loader::accurate_lavapipe;
+pub use messages::{Message, Messages};
+pub use output::{Output, Picture};
+pub use pass::{Attachments, Bindable, Formats, Pass};
+pub use pipeline::{
+    Compute, FRAGMENT, Graphics, Kernel, Pipeline, PipelineOptions, Shader, VERTEX, Vertex,
+    attribute, binding, blend, depth_test, opaque, whole,
+};
+pub use resource::{
+    Buffer, Image, ImageOptions, Sampler, aspects, device_format, range, texel_size,
+};
+pub use settings::{Settings, with_settings};
+pub use target::{PassObject, Target, TargetOptions, fetch_sample};

@@ -1,0 +1,77 @@
+//! Drivers as the Vulkan loader finds them, by manifests in the environment.
+
+use std::path::{Path, PathBuf};
+
+use ash::vk::TaggedStructure;
+use gaurast_runner::Case;
+
+/// Builds this driver's shared library, and writes its manifest to `folder`; returns the manifest's path.
+///
+/// It is the project's manifest but for the library's path.
+///
+/// # Panics
+/// If the library isn't built, or the folder can't be written.
+pub fn manifest(folder: &Path) -> PathBuf {
+    let library = gaurast_runner::built_library("vulkan_gaurast-icd", "libvulkan_gaurast.so");
+    let library = library.to_str().expect("a path of Unicode");
+    let template = include_str!("../../../driver/icd/gaurast_icd.json");
+    let text = template.replace("../../target/release/libvulkan_gaurast.so", library);
+    assert!(text.contains(library), "the template names the library");
+    let path = folder.join("gaurast_icd.json");
+    std::fs::write(&path, text).expect("the manifest is written");
+    path
+}
+
+/// Runs `inside` in a process of its own, where the loader finds this driver alone. The test needs the loader.
+///
+/// # Panics
+/// If it fails there.
+pub fn through_the_loader(case: &Case, inside: impl FnOnce()) {
+    if case.is_alone() {
+        return inside();
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let manifest = manifest(folder.path());
+    case.run_alone(|command| {
+        command
+            .env("VK_DRIVER_FILES", &manifest)
+            .env("VK_ICD_FILENAMES", &manifest)
+            .env("VK_LAYER_CUSTOM_STYPE_LIST", unregistered_structures())
+            .env_remove("VK_INSTANCE_LAYERS");
+    });
+}
+
+/// The extension's structures as the validation layer wants to be told of them in the environment: pairs of type and
+/// size, all of them separated by colons.
+fn unregistered_structures() -> String {
+    use gaurast::vk::{
+        GaussianCameraGAURAST as Camera,
+        PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST as Features,
+        PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST as Properties,
+        PipelineGaussianApproximationStateCreateInfoGAURAST as Approximation,
+        PipelineGaussianStateCreateInfoGAURAST as State,
+    };
+    let separator = if cfg!(windows) { ";" } else { ":" };
+    [
+        (Features::STRUCTURE_TYPE, size_of::<Features<'_>>()),
+        (Properties::STRUCTURE_TYPE, size_of::<Properties<'_>>()),
+        (State::STRUCTURE_TYPE, size_of::<State<'_>>()),
+        (
+            Approximation::STRUCTURE_TYPE,
+            size_of::<Approximation<'_>>(),
+        ),
+        (Camera::STRUCTURE_TYPE, size_of::<Camera<'_>>()),
+    ]
+    .map(|(structure, size)| format!("{}{separator}{size}", structure.as_raw()))
+    .join(separator)
+}
+
+/// Has lavapipe sample textures as accurately as it can: per pixel, and in floats. Has an effect
+/// only before lavapipe's first device of the process.
+///
+/// # Safety
+/// No other thread may read the environment meanwhile, other than through the standard library.
+pub unsafe fn accurate_lavapipe() {
+    // SAFETY: the caller's promise.
+    unsafe { std::env::set_var("GALLIVM_PERF", "no_aos_sampling,no_quad_lod") };
+}

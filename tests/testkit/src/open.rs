@@ -1,0 +1,319 @@
+//! Opening devices: instance, messenger, physical device, and a device with one queue.
+
+use std::ffi::CStr;
+
+use ash::vk;
+use gaurast::gaussian_primitive_topology;
+use gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST as GaussianFeatures;
+
+use crate::messages::Messages;
+
+/// A driver that tests draw by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Driver {
+    /// This driver, linked into the process.
+    Embedded,
+    /// This driver, through the loader.
+    Loaded,
+    /// lavapipe, through the loader.
+    Lavapipe,
+}
+
+impl Driver {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Embedded => "a device",
+            Self::Loaded => "this driver",
+            Self::Lavapipe => "lavapipe",
+        }
+    }
+
+    fn is(self, id: vk::DriverId) -> bool {
+        match self {
+            Self::Embedded => true,
+            Self::Loaded => id != vk::DriverId::MESA_LLVMPIPE,
+            Self::Lavapipe => id == vk::DriverId::MESA_LLVMPIPE,
+        }
+    }
+
+    fn entry(self) -> Result<ash::Entry, OpenError> {
+        match self {
+            Self::Embedded => Ok(vulkan_gaurast::entry()),
+            // SAFETY: the loader is the system's own.
+            Self::Loaded | Self::Lavapipe => unsafe { ash::Entry::load() }
+                .map_err(|error| OpenError::NoLoader(error.to_string())),
+        }
+    }
+}
+
+/// What a device is opened with, beside the features of the core versions that it has.
+#[derive(Clone, Copy, Debug)]
+pub struct Opening<'a> {
+    /// The driver.
+    pub driver: Driver,
+    /// Layers of the instance.
+    pub layers: &'a [&'a CStr],
+    /// Extensions of the device, beside Gaussian draws.
+    pub extensions: &'a [&'a CStr],
+    /// [`EXTENSIONS`] too, with all that the device has of their features.
+    pub all_extensions: bool,
+    /// Features of Gaussian draws; all that the device has by default.
+    pub gaussian: Option<GaussianFeatures<'static>>,
+    /// Access beyond a resource's end is robust. It costs time.
+    pub robust: bool,
+}
+
+impl Opening<'_> {
+    /// What a driver's device is opened with by default: Gaussian draws if it has them, and no robust access.
+    pub const fn of(driver: Driver) -> Self {
+        Self {
+            driver,
+            layers: &[],
+            extensions: &[],
+            all_extensions: false,
+            gaussian: None,
+            robust: false,
+        }
+    }
+}
+
+/// Extensions that this driver has and tests are about.
+pub const EXTENSIONS: [&CStr; 6] = [
+    ash::khr::map_memory2::NAME,
+    ash::khr::performance_query::NAME,
+    ash::khr::push_descriptor::NAME,
+    ash::ext::index_type_uint8::NAME,
+    ash::ext::provoking_vertex::NAME,
+    ash::ext::vertex_attribute_divisor::NAME,
+];
+
+/// Why there is no device.
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum OpenError {
+    /// There is no loader here.
+    #[error("there is no Vulkan loader here: {0}")]
+    NoLoader(String),
+    /// The loader knows no such device.
+    #[error("the Vulkan loader does not know {0}")]
+    NoDevice(&'static str),
+    /// Vulkan refused a step.
+    #[error("Vulkan refused to {0}: {1}")]
+    Refused(&'static str, vk::Result),
+}
+
+pub(crate) fn refused(what: &'static str) -> impl Fn(vk::Result) -> OpenError {
+    move |result| OpenError::Refused(what, result)
+}
+
+/// An instance, its device, and what is known about them. Destroyed when dropped.
+pub(crate) struct Opened {
+    pub(crate) name: String,
+    pub(crate) queue: vk::Queue,
+    pub(crate) device: ash::Device,
+    pub(crate) instance: ash::Instance,
+    pub(crate) physical_device: vk::PhysicalDevice,
+    pub(crate) memory: vk::PhysicalDeviceMemoryProperties,
+    pub(crate) features: vk::PhysicalDeviceFeatures,
+    pub(crate) limits: vk::PhysicalDeviceLimits,
+    pub(crate) gaussian: Option<gaussian_primitive_topology::Device>,
+    pub(crate) messages: Box<Messages>,
+    messenger: vk::DebugUtilsMessengerEXT,
+    debug_utils: ash::ext::debug_utils::Instance,
+    /// Last: it may own the library that all others call.
+    pub(crate) entry: ash::Entry,
+}
+
+impl Opened {
+    /// Opens a device, by `entry` if it is given, with `features` of extensions.
+    pub(crate) fn new<T: vk::ExtendsDeviceCreateInfo>(
+        entry: Option<ash::Entry>,
+        opening: &Opening<'_>,
+        features: Option<&mut T>,
+    ) -> Result<Self, OpenError> {
+        let driver = opening.driver;
+        let entry = entry.map_or_else(|| driver.entry(), Ok)?;
+        let messages = Box::<Messages>::default();
+        let application = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
+        let layers: Vec<_> = opening.layers.iter().map(|layer| layer.as_ptr()).collect();
+        let extensions = [ash::ext::debug_utils::NAME.as_ptr()];
+        let mut messenger_info = messages.messenger();
+        let info = vk::InstanceCreateInfo::default()
+            .application_info(&application)
+            .enabled_layer_names(&layers)
+            .enabled_extension_names(&extensions)
+            .push_next(&mut messenger_info);
+        // SAFETY: the create infos are valid, what is created lives as long as the instance, and the messages outlive the
+        // messenger that writes to them.
+        unsafe {
+            let instance = entry
+                .create_instance(&info, None)
+                .map_err(refused("create an instance"))?;
+            let debug_utils = ash::ext::debug_utils::Instance::new(&entry, &instance);
+            let messenger = debug_utils.create_debug_utils_messenger(&messages.messenger(), None);
+            let found = messenger
+                .map_err(refused("create a messenger"))
+                .and_then(|_| find(&instance, |id| driver.is(id)))
+                .and_then(|found| {
+                    let (physical_device, name) =
+                        found.ok_or(OpenError::NoDevice(driver.name()))?;
+                    let device = create_device(&instance, physical_device, opening, features)?;
+                    Ok((physical_device, name, device))
+                });
+            let messenger = messenger.unwrap_or_default();
+            let (physical_device, name, device) = match found {
+                Ok(found) => found,
+                Err(error) => {
+                    debug_utils.destroy_debug_utils_messenger(messenger, None);
+                    instance.destroy_instance(None);
+                    return Err(error);
+                }
+            };
+            let properties = instance.get_physical_device_properties(physical_device);
+            Ok(Self {
+                name,
+                queue: device.get_device_queue(0, 0),
+                memory: instance.get_physical_device_memory_properties(physical_device),
+                features: instance.get_physical_device_features(physical_device),
+                limits: properties.limits,
+                gaussian: has_gaussians(&instance, physical_device)
+                    .then(|| gaussian_primitive_topology::Device::new(&instance, &device)),
+                device,
+                physical_device,
+                instance,
+                messages,
+                messenger,
+                debug_utils,
+                entry,
+            })
+        }
+    }
+}
+
+impl Drop for Opened {
+    fn drop(&mut self) {
+        // SAFETY: every resource keeps its device, so that none is left.
+        unsafe {
+            self.device.destroy_device(None);
+            self.debug_utils
+                .destroy_debug_utils_messenger(self.messenger, None);
+            self.instance.destroy_instance(None);
+        }
+    }
+}
+
+/// The first device whose driver is wanted, with its name and version.
+fn find(
+    instance: &ash::Instance,
+    is_wanted: impl Fn(vk::DriverId) -> bool,
+) -> Result<Option<(vk::PhysicalDevice, String)>, OpenError> {
+    // SAFETY: the instance is alive.
+    let devices = unsafe { instance.enumerate_physical_devices() };
+    for device in devices.map_err(refused("list devices"))? {
+        let mut driver = vk::PhysicalDeviceDriverProperties::default();
+        let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut driver);
+        // SAFETY: the physical device is the instance's.
+        unsafe { instance.get_physical_device_properties2(device, &mut properties) };
+        if is_wanted(driver.driver_id) {
+            let text = |text: &CStr| text.to_string_lossy().into_owned();
+            let name = text(driver.driver_name_as_c_str().unwrap_or_default());
+            let version = text(driver.driver_info_as_c_str().unwrap_or_default());
+            return Ok(Some((device, format!("{name} {version}"))));
+        }
+    }
+    Ok(None)
+}
+
+/// Reports whether a device draws Gaussians.
+pub(crate) fn has_gaussians(instance: &ash::Instance, physical_device: vk::PhysicalDevice) -> bool {
+    // SAFETY: the physical device is the instance's.
+    let extensions = unsafe { instance.enumerate_device_extension_properties(physical_device) };
+    let is_it = |extension: &vk::ExtensionProperties| {
+        extension.extension_name_as_c_str() == Ok(gaussian_primitive_topology::NAME)
+    };
+    extensions.is_ok_and(|extensions| extensions.iter().any(is_it))
+}
+
+/// Creates a device with every core feature that it has, with features of Gaussian draws if it has those, and with
+/// extensions and their features.
+fn create_device<T: vk::ExtendsDeviceCreateInfo>(
+    instance: &ash::Instance,
+    physical_device: vk::PhysicalDevice,
+    opening: &Opening<'_>,
+    extended: Option<&mut T>,
+) -> Result<ash::Device, OpenError> {
+    let queues = [vk::DeviceQueueCreateInfo::default().queue_priorities(&[1.0])];
+    let mut vulkan_1_1 = vk::PhysicalDeviceVulkan11Features::default();
+    let mut vulkan_1_2 = vk::PhysicalDeviceVulkan12Features::default();
+    let mut vulkan_1_3 = vk::PhysicalDeviceVulkan13Features::default();
+    let mut gaussian = GaussianFeatures::default();
+    let mut performance = vk::PhysicalDevicePerformanceQueryFeaturesKHR::default();
+    let mut indices = vk::PhysicalDeviceIndexTypeUint8FeaturesKHR::default();
+    let mut provoking = vk::PhysicalDeviceProvokingVertexFeaturesEXT::default();
+    let mut divisor = vk::PhysicalDeviceVertexAttributeDivisorFeaturesKHR::default();
+    let has_gaussians = has_gaussians(instance, physical_device);
+    let mut names: Vec<_> = opening
+        .extensions
+        .iter()
+        .map(|name| name.as_ptr())
+        .collect();
+    if has_gaussians {
+        names.push(gaussian_primitive_topology::NAME.as_ptr());
+    }
+    let mut features = vk::PhysicalDeviceFeatures2::default()
+        .push_next(&mut vulkan_1_1)
+        .push_next(&mut vulkan_1_2)
+        .push_next(&mut vulkan_1_3);
+    if has_gaussians {
+        features = features.push_next(&mut gaussian);
+    }
+    if opening.all_extensions {
+        names.extend(EXTENSIONS.map(CStr::as_ptr));
+        features = features
+            .push_next(&mut performance)
+            .push_next(&mut indices)
+            .push_next(&mut provoking)
+            .push_next(&mut divisor);
+    }
+    // SAFETY: the physical device is the instance's, and the create info is valid.
+    unsafe {
+        instance.get_physical_device_features2(physical_device, &mut features);
+        let mut core = features.features;
+        // They are in a chain already.
+        vulkan_1_1.p_next = std::ptr::null_mut();
+        vulkan_1_2.p_next = std::ptr::null_mut();
+        vulkan_1_3.p_next = std::ptr::null_mut();
+        gaussian.p_next = std::ptr::null_mut();
+        performance.p_next = std::ptr::null_mut();
+        indices.p_next = std::ptr::null_mut();
+        provoking.p_next = std::ptr::null_mut();
+        divisor.p_next = std::ptr::null_mut();
+        if !opening.robust {
+            core.robust_buffer_access = vk::FALSE;
+            vulkan_1_3.robust_image_access = vk::FALSE;
+        }
+        gaussian = opening.gaussian.unwrap_or(gaussian);
+        let mut info = vk::DeviceCreateInfo::default()
+            .queue_create_infos(&queues)
+            .enabled_features(&core)
+            .enabled_extension_names(&names)
+            .push_next(&mut vulkan_1_1)
+            .push_next(&mut vulkan_1_2)
+            .push_next(&mut vulkan_1_3);
+        if has_gaussians {
+            info = info.push_next(&mut gaussian);
+        }
+        if opening.all_extensions {
+            info = info
+                .push_next(&mut performance)
+                .push_next(&mut indices)
+                .push_next(&mut provoking)
+                .push_next(&mut divisor);
+        }
+        if let Some(extended) = extended {
+            info = info.push_next(extended);
+        }
+        instance
+            .create_device(physical_device, &info, None)
+            .map_err(refused("create a device"))
+    }
+}

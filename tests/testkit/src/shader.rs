@@ -1,0 +1,92 @@
+//! Shaders written in GLSL, compiled by `glslangValidator` when a test needs them and kept for the
+//! next time.
+
+use std::collections::HashMap;
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::{LazyLock, Mutex, PoisonError};
+
+/// A stage that shaders are written for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Stage {
+    /// Vertex shaders.
+    Vertex,
+    /// Fragment shaders.
+    Fragment,
+    /// Compute shaders.
+    Compute,
+}
+
+impl Stage {
+    fn suffix(self) -> &'static str {
+        match self {
+            Self::Vertex => "vert",
+            Self::Fragment => "frag",
+            Self::Compute => "comp",
+        }
+    }
+}
+
+/// The SPIR-V of GLSL `source`, to which `#version 450` is added in front.
+///
+/// # Panics
+/// If the source is wrong, or there is no compiler.
+pub fn compile(stage: Stage, source: &str) -> Vec<u32> {
+    type Compiled = Mutex<HashMap<(Stage, String), Vec<u32>>>;
+    static COMPILED: LazyLock<Compiled> = LazyLock::new(Mutex::default);
+    // Held while compiling, so that nothing is compiled twice.
+    let mut compiled = COMPILED.lock().unwrap_or_else(PoisonError::into_inner);
+    let key = (stage, source.to_owned());
+    compiled
+        .entry(key)
+        .or_insert_with(|| kept_or_compiled(stage, source))
+        .clone()
+}
+
+fn kept_or_compiled(stage: Stage, source: &str) -> Vec<u32> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target/triangle-shaders");
+    let mut hasher = DefaultHasher::new();
+    (stage, source).hash(&mut hasher);
+    let path = folder.join(format!("{:016x}.{}", hasher.finish(), stage.suffix()));
+    let kept = path.with_extension("spv");
+    // The source is kept too, so that a clash of hashes cannot exchange shaders.
+    if std::fs::read_to_string(&path).is_ok_and(|text| text == whole(source))
+        && let Ok(bytes) = std::fs::read(&kept)
+    {
+        return bytemuck::pod_collect_to_vec(&bytes);
+    }
+    std::fs::create_dir_all(&folder).expect("a folder for shaders");
+    compile_to(stage, source, &path, &kept)
+}
+
+fn whole(source: &str) -> String {
+    format!("#version 450\n{source}")
+}
+
+/// Compiles under names of this process alone, then moves the files to where others look.
+fn compile_to(stage: Stage, source: &str, path: &Path, kept: &Path) -> Vec<u32> {
+    let mine = |path: &Path| -> PathBuf {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        path.with_file_name(format!("{}-{name}", std::process::id()))
+    };
+    let (my_source, my_spirv) = (mine(path), mine(kept));
+    std::fs::write(&my_source, whole(source)).expect("a shader is written");
+    let output = Command::new("glslangValidator")
+        .args(["--target-env", "vulkan1.1", "-S", stage.suffix(), "-o"])
+        .arg(&my_spirv)
+        .arg(&my_source)
+        .output()
+        .expect("glslangValidator starts");
+    assert!(
+        output.status.success(),
+        "{source}\n{}{}",
+        String::from_utf8_lossy(&output.stdout),
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let bytes = std::fs::read(&my_spirv).expect("SPIR-V is there");
+    // The source last, since it says that the SPIR-V is complete.
+    std::fs::rename(&my_spirv, kept).expect("it is kept");
+    std::fs::rename(&my_source, path).expect("it is kept");
+    bytemuck::pod_collect_to_vec(&bytes)
+}

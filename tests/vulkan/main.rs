@@ -1,0 +1,42 @@
+//! The driver as an application sees it: `ash` over the embedded door and through the loader.
+//!
+//! `unsafe` here has one reason throughout: these are Vulkan calls, and each test follows Vulkan's valid usage or
+//! breaks it in the one way that it is about, which the driver must survive.
+
+mod canvas;
+mod command_buffers;
+mod compute;
+mod context;
+mod descriptors;
+mod devices;
+mod dynamic_states;
+mod embedded;
+mod gaussian_draws;
+mod gaussian_modes;
+mod gaussian_pipelines;
+mod gaussian_shaders;
+mod image_transfers;
+mod images;
+mod images_in_shaders;
+mod leaks;
+mod loader;
+mod memory;
+mod polygon_attachments;
+mod polygon_draws;
+mod polygon_pipelines;
+mod polygon_resources;
+mod polygon_shaders;
+mod queries;
+mod render_passes;
+mod scene;
+mod subpasses;
+mod synchronization;
+mod transfers;
+mod valid_usage;
+mod validation;
+mod viewer_usage;
+mod watchdog;
+
+fn main() -> std::process::ExitCode {
+    gaurast_runner::main()
+}

@@ -1,0 +1,399 @@
+//! The extension's valid usage: each statement of the specification is broken once, and its id is heard.
+
+use crate::devices::{gaussian, open, without_modes};
+use crate::scene::{Scene, camera, splat, splats};
+use ash::vk;
+use gaurast::vk::{
+    GaussianAntialiasingGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST,
+    GaussianCameraSourceGAURAST, GaussianGeometryGAURAST, GaussianLinearizationGAURAST,
+    GaussianOrderGAURAST, GaussianPrecisionGAURAST, GaussianProjectionModeGAURAST,
+    PipelineGaussianApproximationStateCreateInfoGAURAST, PipelineGaussianStateCreateFlagsGAURAST,
+    PipelineGaussianStateCreateInfoGAURAST,
+};
+use gaurast_testkit::{Gpu, Graphics, Shader};
+use std::collections::BTreeSet;
+
+const SPECIFICATION: &str =
+    include_str!("../../api/spec/VK_GAURAST_gaussian_primitive_topology.adoc");
+
+/// The ids of the specification's statements.
+fn stated() -> BTreeSet<&'static str> {
+    let is_of_id = |c: char| c.is_ascii_alphanumeric() || c == '-';
+    let candidates = SPECIFICATION.split(|c: char| !is_of_id(c));
+    candidates.filter(|id| id.starts_with("VUID-")).collect()
+}
+
+type State = PipelineGaussianStateCreateInfoGAURAST<'static>;
+
+fn with(change: impl FnOnce(State) -> State) -> Graphics<'static> {
+    let request = splats();
+    Graphics {
+        gaussian: request.gaussian.map(change),
+        ..request
+    }
+}
+
+fn allowing(exponential_error: f32, contribution_budget: f32) -> Graphics<'static> {
+    let approximation = PipelineGaussianApproximationStateCreateInfoGAURAST::default()
+        .exponential_error(exponential_error)
+        .contribution_budget(contribution_budget);
+    Graphics {
+        approximation: Some(approximation),
+        ..splats()
+    }
+}
+
+/// Pipelines that break one statement each.
+fn pipelines() -> Vec<(&'static str, Graphics<'static>)> {
+    let missing = |index: usize| {
+        let mut request = splats();
+        request.attributes.truncate(index);
+        request
+    };
+    let buffer = GaussianCameraSourceGAURAST::UNIFORM_BUFFER;
+    vec![
+        (
+            "VUID-VkGraphicsPipelineCreateInfo-topology-GAURAST",
+            Graphics {
+                gaussian: None,
+                ..splats()
+            },
+        ),
+        (
+            "VUID-VkPipelineInputAssemblyStateCreateInfo-topology-GAURAST",
+            Graphics {
+                restart: true,
+                ..splats()
+            },
+        ),
+        (
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-parameter",
+            with(|s| s.order(GaussianOrderGAURAST::from_raw(77))),
+        ),
+        (
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-sphericalHarmonicsDegree-value",
+            with(|s| s.spherical_harmonics_degree(9)),
+        ),
+        (
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-lowPassVariance-value",
+            with(|s| s.low_pass_variance(f32::NAN)),
+        ),
+        (
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-alphaFloor-value",
+            with(|s| s.alpha_floor(-1.0)),
+        ),
+        (
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-alphaCeiling-value",
+            with(|s| s.alpha_ceiling(0.0)),
+        ),
+        (
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-transmittanceFloor-value",
+            with(|s| s.transmittance_floor(1.0)),
+        ),
+        (
+            "VUID-VkPipelineGaussianApproximationStateCreateInfoGAURAST-exponentialError-value",
+            allowing(-0.1, 0.0),
+        ),
+        (
+            "VUID-VkPipelineGaussianApproximationStateCreateInfoGAURAST-contributionBudget-value",
+            allowing(0.0, f32::NAN),
+        ),
+        (
+            "VUID-VkGaussianAttributeLocationsGAURAST-location",
+            missing(2),
+        ),
+        (
+            "VUID-VkGaussianAttributeLocationsGAURAST-distinct",
+            with(|s| s.attribute_locations(s.attribute_locations.model_opacity(0))),
+        ),
+        (
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-firstModelMatrix-modes",
+            with(|s| {
+                s.order(GaussianOrderGAURAST::PER_PIXEL)
+                    .attribute_locations(s.attribute_locations.first_model_matrix(0))
+            }),
+        ),
+        (
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-geometry-linearization",
+            with(|s| {
+                s.geometry(GaussianGeometryGAURAST::GAUSSIAN_2D)
+                    .linearization(GaussianLinearizationGAURAST::UNSCENTED)
+            }),
+        ),
+        (
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-geometry-antialiasing",
+            with(|s| {
+                s.geometry(GaussianGeometryGAURAST::GAUSSIAN_2D)
+                    .antialiasing(GaussianAntialiasingGAURAST::OPACITY_COMPENSATED)
+            }),
+        ),
+        (
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-precision-modes",
+            with(|s| {
+                s.precision(GaussianPrecisionGAURAST::FLOAT16)
+                    .order(GaussianOrderGAURAST::PER_PIXEL)
+            }),
+        ),
+        (
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-cameraBinding-layout",
+            with(|s| s.camera_source(buffer)),
+        ),
+    ]
+}
+
+/// Pipelines that use a mode each, on a device on which none is enabled.
+fn modes() -> Vec<(&'static str, Graphics<'static>)> {
+    let buffer = GaussianCameraSourceGAURAST::UNIFORM_BUFFER;
+    let compensated = GaussianAntialiasingGAURAST::OPACITY_COMPENSATED;
+    vec![
+        (
+            "vertexShaderProjection",
+            with(|s| s.projection_mode(GaussianProjectionModeGAURAST::VERTEX_SHADER)),
+        ),
+        (
+            "radialDistanceOrder",
+            with(|s| s.order(GaussianOrderGAURAST::RADIAL_DISTANCE)),
+        ),
+        (
+            "primitiveOrder",
+            with(|s| s.order(GaussianOrderGAURAST::PRIMITIVE)),
+        ),
+        (
+            "perPixelOrder",
+            with(|s| s.order(GaussianOrderGAURAST::PER_PIXEL)),
+        ),
+        (
+            "rasterizationFloat16",
+            with(|s| s.precision(GaussianPrecisionGAURAST::FLOAT16)),
+        ),
+        ("opacityCompensation", with(|s| s.antialiasing(compensated))),
+        (
+            "unscentedProjection",
+            with(|s| s.linearization(GaussianLinearizationGAURAST::UNSCENTED)),
+        ),
+        (
+            "gaussian2D",
+            with(|s| s.geometry(GaussianGeometryGAURAST::GAUSSIAN_2D)),
+        ),
+        ("uniformBufferCamera", with(|s| s.camera_source(buffer))),
+        ("gaussianApproximation", allowing(1e-3, 0.0)),
+        (
+            "attributeActivation",
+            with(|s| s.flags(PipelineGaussianStateCreateFlagsGAURAST::LOG_SCALE)),
+        ),
+        (
+            "sphericalHarmonicsBuffer",
+            with(|s| s.flags(PipelineGaussianStateCreateFlagsGAURAST::SPHERICAL_HARMONICS_BUFFER)),
+        ),
+        (
+            "gaussianDynamicState",
+            Graphics {
+                dynamic: vec![gaurast::vk::DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST],
+                ..splats()
+            },
+        ),
+        (
+            "gaussianMultiview",
+            Graphics {
+                view_mask: 1,
+                ..splats()
+            },
+        ),
+        (
+            "gaussianInstancing",
+            with(|s| s.attribute_locations(s.attribute_locations.first_model_matrix(9))),
+        ),
+        (
+            "gaussianDepthStencil",
+            Graphics {
+                depth_stencil: vk::PipelineDepthStencilStateCreateInfo::default()
+                    .depth_test_enable(true),
+                depth_format: vk::Format::D32_SFLOAT,
+                ..splats()
+            },
+        ),
+        (
+            "gaussianMultisample",
+            Graphics {
+                multisample: vk::PipelineMultisampleStateCreateInfo::default()
+                    .rasterization_samples(vk::SampleCountFlags::TYPE_4),
+                ..splats()
+            },
+        ),
+    ]
+}
+
+/// Cameras that break one statement each.
+fn cameras() -> Vec<(&'static str, GaussianCameraGAURAST<'static>)> {
+    let nan = f32::NAN;
+    vec![
+        (
+            "VUID-VkGaussianCameraGAURAST-model-parameter",
+            camera().model(GaussianCameraModelGAURAST::from_raw(77)),
+        ),
+        (
+            "VUID-VkGaussianCameraGAURAST-rotation-value",
+            camera().rotation([nan; 9]),
+        ),
+        (
+            "VUID-VkGaussianCameraGAURAST-eye-value",
+            camera().eye([f64::INFINITY; 3]),
+        ),
+        (
+            "VUID-VkGaussianCameraGAURAST-principalPoint-value",
+            camera().principal_point([nan, 0.0]),
+        ),
+        (
+            "VUID-VkGaussianCameraGAURAST-depthCoefficients-value",
+            camera().depth_coefficients([0.0, nan]),
+        ),
+        (
+            "VUID-VkGaussianCameraGAURAST-focalLength-value",
+            camera().focal_length([0.0, 1.0]),
+        ),
+        (
+            "VUID-VkGaussianCameraGAURAST-nearPlane-value",
+            camera().near_plane(0.0),
+        ),
+        (
+            "VUID-VkGaussianCameraGAURAST-farPlane-value",
+            camera().far_plane(0.1),
+        ),
+    ]
+}
+
+/// Creates the pipeline, which must fail, and gives what was heard.
+fn refused(gpu: &Gpu, request: &Graphics<'_>, result: vk::Result, what: &str) -> String {
+    let error = request.create(gpu).expect_err(what);
+    assert_eq!(error, result, "{what}");
+    gpu.message_texts().concat()
+}
+
+#[gaurast_runner::test]
+fn every_statement_is_reported_by_its_id() {
+    let mut tested = BTreeSet::new();
+    let mut heard = |id: &'static str, messages: String| {
+        assert!(messages.contains(&format!("({id})")), "{id}: {messages:?}");
+        tested.insert(id);
+    };
+    let gpu = open();
+    let invalid = vk::Result::ERROR_VALIDATION_FAILED_EXT;
+    for (id, request) in pipelines() {
+        heard(id, refused(&gpu, &request, invalid, id));
+    }
+    heard(
+        "VUID-VkGraphicsPipelineCreateInfo-projectionMode-GAURAST",
+        with_a_vertex_stage(&gpu),
+    );
+    for (id, messages) in crate::gaussian_shaders::broken() {
+        heard(id, messages);
+    }
+    for (id, messages) in crate::viewer_usage::broken() {
+        heard(id, messages);
+    }
+    for (id, camera) in cameras() {
+        let recorded = gpu.try_record(|recording| {
+            let (_, commands) = recording.raw();
+            // SAFETY: see the crate.
+            unsafe { gaussian(&gpu).cmd_set_gaussian_cameras(commands, &[camera]) };
+        });
+        assert_eq!(recorded.unwrap_err(), invalid, "{id}");
+        heard(id, gpu.message_texts().concat());
+    }
+    heard("VUID-vkCmdDraw-geometry-GAURAST", flat_through_a_fisheye());
+    let bare = without_modes();
+    let absent = vk::Result::ERROR_FEATURE_NOT_PRESENT;
+    let stated = stated();
+    let of_feature = |feature: &str| {
+        let id = format!("VUID-VkPipelineGaussianStateCreateInfoGAURAST-{feature}-feature");
+        let found = stated.iter().find(|stated| **stated == id);
+        *found.unwrap_or_else(|| panic!("{id} is not stated"))
+    };
+    for (feature, request) in modes() {
+        heard(
+            of_feature(feature),
+            refused(&bare, &request, absent, feature),
+        );
+    }
+    heard(
+        of_feature("resolveFragmentShader"),
+        with_a_fragment_stage(&bare),
+    );
+    heard(
+        of_feature("gaussianPrimitiveTopology"),
+        without_the_topology(),
+    );
+    let untested: Vec<_> = stated.difference(&tested).collect();
+    assert!(untested.is_empty(), "no test breaks {untested:?}");
+}
+
+/// What is heard when 2D Gaussians are drawn through a fisheye, which draws nothing.
+fn flat_through_a_fisheye() -> String {
+    let scene = Scene::new(
+        &[splat([0.0, 0.0, 5.0], 0.1, 0.8, [0.5; 3])],
+        &with(|s| s.geometry(GaussianGeometryGAURAST::GAUSSIAN_2D)),
+    );
+    let pixels = scene.draw([0.25; 4], |device, commands| {
+        let fisheye = camera().model(GaussianCameraModelGAURAST::FISHEYE);
+        // SAFETY: see the crate.
+        unsafe {
+            (gaussian(&scene.gpu)).cmd_set_gaussian_cameras(commands, &[fisheye]);
+            device.cmd_draw(commands, 1, 1, 0, 0);
+        }
+    });
+    assert!(pixels.iter().all(|pixel| *pixel == [0.25; 4]));
+    scene.gpu.message_texts().concat()
+}
+
+/// What is heard when a pipeline has a stage.
+fn with_a_stage(gpu: &Gpu, stage: vk::ShaderStageFlags, result: vk::Result) -> String {
+    let code = vec![0x0723_0203, 0x0001_0000, 0, 1, 0];
+    let request = Graphics {
+        shaders: vec![Shader::new(stage, code)],
+        ..splats()
+    };
+    refused(gpu, &request, result, "a stage")
+}
+
+fn with_a_vertex_stage(gpu: &Gpu) -> String {
+    let result = vk::Result::ERROR_VALIDATION_FAILED_EXT;
+    with_a_stage(gpu, vk::ShaderStageFlags::VERTEX, result)
+}
+
+fn with_a_fragment_stage(gpu: &Gpu) -> String {
+    let result = vk::Result::ERROR_FEATURE_NOT_PRESENT;
+    with_a_stage(gpu, vk::ShaderStageFlags::FRAGMENT, result)
+}
+
+fn without_the_topology() -> String {
+    let gpu = crate::devices::without_the_topology();
+    let result = vk::Result::ERROR_FEATURE_NOT_PRESENT;
+    refused(&gpu, &splats(), result, "the topology")
+}
+
+#[gaurast_runner::test]
+fn a_camera_whose_feature_is_not_enabled_draws_nothing_and_says_so() {
+    let scene = Scene::on(
+        without_modes(),
+        &[splat([0.0, 0.0, 5.0], 0.1, 0.8, [0.5; 3])],
+        &splats(),
+    );
+    for model in [
+        GaussianCameraModelGAURAST::ORTHOGRAPHIC,
+        GaussianCameraModelGAURAST::FISHEYE,
+        GaussianCameraModelGAURAST::EQUIRECTANGULAR,
+    ] {
+        let pixels = scene.draw([0.25; 4], |device, commands| {
+            // SAFETY: see the crate.
+            unsafe {
+                let gaussian = gaussian(&scene.gpu);
+                gaussian.cmd_set_gaussian_cameras(commands, &[camera().model(model)]);
+                device.cmd_draw(commands, 1, 1, 0, 0);
+            }
+        });
+        assert!(pixels.iter().all(|pixel| *pixel == [0.25; 4]));
+        let messages = scene.gpu.message_texts().concat();
+        let id = "VUID-VkGaussianCameraGAURAST-model-parameter";
+        assert!(messages.contains(id), "{messages:?}");
+    }
+}
