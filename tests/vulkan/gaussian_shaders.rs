@@ -392,7 +392,7 @@ pub fn broken() -> Vec<(&'static str, String)> {
             ..request
         }
     };
-    let location = "VUID-VkGaussianVertexOutputLocationsGAURAST-location";
+    let location = "VUID-VkGaussianVertexOutputLocationsGAURAST-None-90020";
     let by_distance = || {
         let request = with(outputs().depth_key(unused));
         let state = request.gaussian;
@@ -417,18 +417,18 @@ pub fn broken() -> Vec<(&'static str, String)> {
         request.gaussian = state;
         request
     };
-    let read = "VUID-VkGaussianResolveInputLocationsGAURAST-location";
+    let read = "VUID-VkGaussianResolveInputLocationsGAURAST-None-90023";
     let requests = [
         // Nothing is there, or too little, or the same.
         (read, resolved(&stage.toned, [3, 5])),
         (read, resolved(&stage.toned, [5, 2])),
         (read, resolved(&stage.woven, [0, 0])),
         (
-            "VUID-VkGraphicsPipelineCreateInfo-FragDepth-GAURAST",
+            "VUID-VkGraphicsPipelineCreateInfo-FragDepth-90024",
             resolved(&stage.deep, [0, 1]),
         ),
         (
-            "VUID-VkGaussianResolveInputLocationsGAURAST-depth-modes",
+            "VUID-VkGaussianResolveInputLocationsGAURAST-depth-90031",
             half(resolved(&stage.toned, [0, 1])),
         ),
         // Not written, too narrow, and named twice.
@@ -437,11 +437,11 @@ pub fn broken() -> Vec<(&'static str, String)> {
         (location, with(outputs().opacity(unused))),
         (location, with(outputs().depth_key(3))),
         (
-            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-depthKey-order",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-depthKey-90021",
             by_distance(),
         ),
         (
-            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-projectionMode-order",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-projectionMode-90022",
             per_pixel(),
         ),
     ];
@@ -513,6 +513,6 @@ fn a_stage_is_needed() {
     let error = request(true).create(&canvas.gpu).expect_err("no stage");
     assert_eq!(error, vk::Result::ERROR_VALIDATION_FAILED_EXT);
     let messages = canvas.gpu.message_texts().concat();
-    let id = "VUID-VkGraphicsPipelineCreateInfo-projectionMode-GAURAST";
+    let id = "VUID-VkGraphicsPipelineCreateInfo-projectionMode-90008";
     assert!(messages.contains(id), "{messages:?}");
 }

@@ -53,14 +53,14 @@ fn pipelines() -> Vec<(&'static str, Graphics<'static>)> {
     let buffer = GaussianCameraSourceGAURAST::UNIFORM_BUFFER;
     vec![
         (
-            "VUID-VkGraphicsPipelineCreateInfo-topology-GAURAST",
+            "VUID-VkGraphicsPipelineCreateInfo-topology-90007",
             Graphics {
                 gaussian: None,
                 ..splats()
             },
         ),
         (
-            "VUID-VkPipelineInputAssemblyStateCreateInfo-topology-GAURAST",
+            "VUID-VkPipelineInputAssemblyStateCreateInfo-topology-90009",
             Graphics {
                 restart: true,
                 ..splats()
@@ -71,71 +71,71 @@ fn pipelines() -> Vec<(&'static str, Graphics<'static>)> {
             with(|s| s.order(GaussianOrderGAURAST::from_raw(77))),
         ),
         (
-            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-sphericalHarmonicsDegree-value",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-sphericalHarmonicsDegree-90010",
             with(|s| s.spherical_harmonics_degree(9)),
         ),
         (
-            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-lowPassVariance-value",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-lowPassVariance-90011",
             with(|s| s.low_pass_variance(f32::NAN)),
         ),
         (
-            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-alphaFloor-value",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-alphaFloor-90012",
             with(|s| s.alpha_floor(-1.0)),
         ),
         (
-            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-alphaCeiling-value",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-alphaCeiling-90013",
             with(|s| s.alpha_ceiling(0.0)),
         ),
         (
-            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-transmittanceFloor-value",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-transmittanceFloor-90014",
             with(|s| s.transmittance_floor(1.0)),
         ),
         (
-            "VUID-VkPipelineGaussianApproximationStateCreateInfoGAURAST-exponentialError-value",
+            "VUID-VkPipelineGaussianApproximationStateCreateInfoGAURAST-exponentialError-90051",
             allowing(-0.1, 0.0),
         ),
         (
-            "VUID-VkPipelineGaussianApproximationStateCreateInfoGAURAST-contributionBudget-value",
+            "VUID-VkPipelineGaussianApproximationStateCreateInfoGAURAST-contributionBudget-90052",
             allowing(0.0, f32::NAN),
         ),
         (
-            "VUID-VkGaussianAttributeLocationsGAURAST-location",
+            "VUID-VkGaussianAttributeLocationsGAURAST-None-90015",
             missing(2),
         ),
         (
-            "VUID-VkGaussianAttributeLocationsGAURAST-distinct",
+            "VUID-VkGaussianAttributeLocationsGAURAST-None-90019",
             with(|s| s.attribute_locations(s.attribute_locations.model_opacity(0))),
         ),
         (
-            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-firstModelMatrix-modes",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-firstModelMatrix-90028",
             with(|s| {
                 s.order(GaussianOrderGAURAST::PER_PIXEL)
                     .attribute_locations(s.attribute_locations.first_model_matrix(0))
             }),
         ),
         (
-            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-geometry-linearization",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-geometry-90029",
             with(|s| {
                 s.geometry(GaussianGeometryGAURAST::GAUSSIAN_2D)
                     .linearization(GaussianLinearizationGAURAST::UNSCENTED)
             }),
         ),
         (
-            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-geometry-antialiasing",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-geometry-90027",
             with(|s| {
                 s.geometry(GaussianGeometryGAURAST::GAUSSIAN_2D)
                     .antialiasing(GaussianAntialiasingGAURAST::OPACITY_COMPENSATED)
             }),
         ),
         (
-            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-precision-modes",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-precision-90030",
             with(|s| {
                 s.precision(GaussianPrecisionGAURAST::FLOAT16)
                     .order(GaussianOrderGAURAST::PER_PIXEL)
             }),
         ),
         (
-            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-cameraBinding-layout",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-cameraBinding-90025",
             with(|s| s.camera_source(buffer)),
         ),
     ]
@@ -232,31 +232,31 @@ fn cameras() -> Vec<(&'static str, GaussianCameraGAURAST<'static>)> {
             camera().model(GaussianCameraModelGAURAST::from_raw(77)),
         ),
         (
-            "VUID-VkGaussianCameraGAURAST-rotation-value",
+            "VUID-VkGaussianCameraGAURAST-rotation-90064",
             camera().rotation([nan; 9]),
         ),
         (
-            "VUID-VkGaussianCameraGAURAST-eye-value",
+            "VUID-VkGaussianCameraGAURAST-eye-90065",
             camera().eye([f64::INFINITY; 3]),
         ),
         (
-            "VUID-VkGaussianCameraGAURAST-principalPoint-value",
+            "VUID-VkGaussianCameraGAURAST-principalPoint-90066",
             camera().principal_point([nan, 0.0]),
         ),
         (
-            "VUID-VkGaussianCameraGAURAST-depthCoefficients-value",
+            "VUID-VkGaussianCameraGAURAST-depthCoefficients-90067",
             camera().depth_coefficients([0.0, nan]),
         ),
         (
-            "VUID-VkGaussianCameraGAURAST-focalLength-value",
+            "VUID-VkGaussianCameraGAURAST-focalLength-90068",
             camera().focal_length([0.0, 1.0]),
         ),
         (
-            "VUID-VkGaussianCameraGAURAST-nearPlane-value",
+            "VUID-VkGaussianCameraGAURAST-nearPlane-90069",
             camera().near_plane(0.0),
         ),
         (
-            "VUID-VkGaussianCameraGAURAST-farPlane-value",
+            "VUID-VkGaussianCameraGAURAST-farPlane-90070",
             camera().far_plane(0.1),
         ),
     ]
@@ -282,7 +282,7 @@ fn every_statement_is_reported_by_its_id() {
         heard(id, refused(&gpu, &request, invalid, id));
     }
     heard(
-        "VUID-VkGraphicsPipelineCreateInfo-projectionMode-GAURAST",
+        "VUID-VkGraphicsPipelineCreateInfo-projectionMode-90008",
         with_a_vertex_stage(&gpu),
     );
     for (id, messages) in crate::gaussian_shaders::broken() {
@@ -300,14 +300,14 @@ fn every_statement_is_reported_by_its_id() {
         assert_eq!(recorded.unwrap_err(), invalid, "{id}");
         heard(id, gpu.message_texts().concat());
     }
-    heard("VUID-vkCmdDraw-geometry-GAURAST", flat_through_a_fisheye());
+    heard("VUID-vkCmdDraw-geometry-90071", flat_through_a_fisheye());
     let bare = without_modes();
     let absent = vk::Result::ERROR_FEATURE_NOT_PRESENT;
     let stated = stated();
     let of_feature = |feature: &str| {
-        let id = format!("VUID-VkPipelineGaussianStateCreateInfoGAURAST-{feature}-feature");
-        let found = stated.iter().find(|stated| **stated == id);
-        *found.unwrap_or_else(|| panic!("{id} is not stated"))
+        let id = format!("VUID-VkPipelineGaussianStateCreateInfoGAURAST-{feature}-");
+        let found = stated.iter().find(|stated| stated.starts_with(&id));
+        *found.unwrap_or_else(|| panic!("no statement is of {feature}"))
     };
     for (feature, request) in modes() {
         heard(

@@ -104,15 +104,15 @@ fn harmonics_buffers() -> Vec<(&'static str, String)> {
         // SAFETY: see the crate.
         unsafe { device.cmd_draw(commands, 1, 1, 0, 0) };
     });
-    let format = "VUID-VkGaussianSphericalHarmonicsBufferGAURAST-format-value";
+    let format = "VUID-VkGaussianSphericalHarmonicsBufferGAURAST-format-90017";
     vec![
         (
-            "VUID-VkGaussianSphericalHarmonicsBufferGAURAST-deviceAddress-range",
+            "VUID-VkGaussianSphericalHarmonicsBufferGAURAST-deviceAddress-90016",
             too_long,
         ),
         (format, integers),
         (format, too_few),
-        ("VUID-vkCmdDraw-sphericalHarmonicsBuffer-GAURAST", none),
+        ("VUID-vkCmdDraw-sphericalHarmonicsBuffer-90018", none),
     ]
 }
 
@@ -137,33 +137,33 @@ fn dynamic_states() -> Vec<(&'static str, String)> {
                 },
             ),
             (
-                "VUID-vkCmdSetGaussianLowPassVarianceGAURAST-lowPassVariance-value",
+                "VUID-vkCmdSetGaussianLowPassVarianceGAURAST-lowPassVariance-90053",
                 &|own, commands| own.cmd_set_gaussian_low_pass_variance(commands, f32::INFINITY),
             ),
             (
-                "VUID-vkCmdSetGaussianAlphaFloorGAURAST-alphaFloor-value",
+                "VUID-vkCmdSetGaussianAlphaFloorGAURAST-alphaFloor-90054",
                 &|own, commands| {
                     own.cmd_set_gaussian_alpha_floor(commands, 1.5);
                 },
             ),
             (
-                "VUID-vkCmdSetGaussianAlphaCeilingGAURAST-alphaCeiling-value",
+                "VUID-vkCmdSetGaussianAlphaCeilingGAURAST-alphaCeiling-90055",
                 &|own, commands| own.cmd_set_gaussian_alpha_ceiling(commands, 0.0),
             ),
             (
-                "VUID-vkCmdSetGaussianTransmittanceFloorGAURAST-transmittanceFloor-value",
+                "VUID-vkCmdSetGaussianTransmittanceFloorGAURAST-transmittanceFloor-90056",
                 &|own, commands| own.cmd_set_gaussian_transmittance_floor(commands, 1.0),
             ),
             (
-                "VUID-vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST-sphericalHarmonicsDegree-value",
+                "VUID-vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST-sphericalHarmonicsDegree-90057",
                 &|own, commands| own.cmd_set_gaussian_spherical_harmonics_degree(commands, 5),
             ),
             (
-                "VUID-vkCmdSetGaussianExponentialErrorGAURAST-exponentialError-value",
+                "VUID-vkCmdSetGaussianExponentialErrorGAURAST-exponentialError-90058",
                 &|own, commands| own.cmd_set_gaussian_exponential_error(commands, f32::NAN),
             ),
             (
-                "VUID-vkCmdSetGaussianContributionBudgetGAURAST-contributionBudget-value",
+                "VUID-vkCmdSetGaussianContributionBudgetGAURAST-contributionBudget-90059",
                 &|own, commands| own.cmd_set_gaussian_contribution_budget(commands, -1.0),
             ),
         ]
@@ -192,8 +192,8 @@ fn dynamic_states() -> Vec<(&'static str, String)> {
         &|own, commands| unsafe { own.cmd_set_gaussian_spherical_harmonics_degree(commands, 1) },
     );
     broken.extend([
-        ("VUID-vkCmdDraw-dynamic-GAURAST", ceiling),
-        ("VUID-vkCmdDraw-sphericalHarmonicsDegree-GAURAST", degree),
+        ("VUID-vkCmdDraw-dynamic-90060", ceiling),
+        ("VUID-vkCmdDraw-sphericalHarmonicsDegree-90061", degree),
     ]);
     broken
 }
@@ -267,15 +267,15 @@ fn sets() -> Vec<(&'static str, String)> {
     });
     vec![
         (
-            "VUID-vkCmdBeginGaussianSetGAURAST-mergedDraws-feature",
+            "VUID-vkCmdBeginGaussianSetGAURAST-mergedDraws-90001",
             feature,
         ),
         ("VUID-vkCmdBeginGaussianSetGAURAST-renderpass", outside),
-        ("VUID-vkCmdBeginGaussianSetGAURAST-set-begun", twice),
-        ("VUID-vkCmdEndGaussianSetGAURAST-set-begun", not_begun),
-        ("VUID-vkCmdBeginGaussianSetGAURAST-set-end", not_ended),
-        ("VUID-vkCmdDraw-set-state-GAURAST", other_camera),
-        ("VUID-vkCmdDraw-set-pipeline-GAURAST", other_pipeline),
+        ("VUID-vkCmdBeginGaussianSetGAURAST-None-90002", twice),
+        ("VUID-vkCmdEndGaussianSetGAURAST-None-90004", not_begun),
+        ("VUID-vkCmdBeginGaussianSetGAURAST-None-90003", not_ended),
+        ("VUID-vkCmdDraw-None-90006", other_camera),
+        ("VUID-vkCmdDraw-None-90005", other_pipeline),
     ]
 }
 
@@ -287,7 +287,7 @@ fn cameras_by_view() -> Vec<(&'static str, String)> {
             unsafe { gaussian(&gpu).cmd_set_gaussian_cameras(commands, cameras) };
         })
     };
-    let limit = "VUID-vkCmdSetGaussianCamerasGAURAST-cameraCount-limit";
+    let limit = "VUID-vkCmdSetGaussianCamerasGAURAST-cameraCount-90062";
     let binding = vk::DescriptorSetLayoutBinding::default()
         .descriptor_type(vk::DescriptorType::UNIFORM_BUFFER)
         .descriptor_count(1)
@@ -311,7 +311,7 @@ fn cameras_by_view() -> Vec<(&'static str, String)> {
         };
         refused(&gpu, &request)
     };
-    let views = "VUID-VkPipelineGaussianStateCreateInfoGAURAST-cameraCount-views";
+    let views = "VUID-VkPipelineGaussianStateCreateInfoGAURAST-cameraCount-90026";
     let by_view = Graphics {
         view_mask: 0b101,
         ..splats()
@@ -329,7 +329,7 @@ fn cameras_by_view() -> Vec<(&'static str, String)> {
         (limit, set(&[camera(); 33])),
         (views, counted(0)),
         (views, counted(2)),
-        ("VUID-vkCmdDraw-cameraCount-GAURAST", of_view),
+        ("VUID-vkCmdDraw-cameraCount-90063", of_view),
     ];
     // SAFETY: see the crate.
     unsafe {

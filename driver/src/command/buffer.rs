@@ -242,7 +242,7 @@ impl Recorder {
         match self.has_gaussian_set {
             false => Ok(()),
             true => Err(Error::usage(
-                "VUID-vkCmdBeginGaussianSetGAURAST-set-end",
+                "VUID-vkCmdBeginGaussianSetGAURAST-None-90003",
                 "a set of draws that vkCmdBeginGaussianSetGAURAST has begun must end by vkCmdEndGaussianSetGAURAST \
                  before its subpass, its dynamic rendering or the command buffer ends, or secondaries are executed",
             )),

@@ -47,7 +47,7 @@ pub(crate) fn cmd_set_gaussian_cameras(
     let most = limits::properties().max_multiview_view_count as usize;
     if cameras.is_empty() || cameras.len() > most {
         return Err(Error::usage(
-            "VUID-vkCmdSetGaussianCamerasGAURAST-cameraCount-limit",
+            "VUID-vkCmdSetGaussianCamerasGAURAST-cameraCount-90062",
             format!(
                 "cameraCount is {}, but must be at least 1 and at most maxMultiviewViewCount ({most})",
                 cameras.len()
@@ -73,7 +73,7 @@ pub(super) fn read(range: &BufferRange, number: usize) -> Result<Camera, Error> 
     let place = range.offset.saturating_add(start);
     if !inside || range.memory.read(place, &mut words).is_err() {
         return Err(Error::usage(
-            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-cameraBinding-layout",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-cameraBinding-90025",
             format!(
                 "it has {} bytes, and camera {number} begins at byte {start} and takes {DATA_BYTES}",
                 range.size
@@ -105,37 +105,37 @@ fn validate(camera: &GaussianCameraGAURAST, model: CameraModel) -> Result<(), Er
     let rules = [
         (
             finite(&c.rotation),
-            "VUID-VkGaussianCameraGAURAST-rotation-value",
+            "VUID-VkGaussianCameraGAURAST-rotation-90064",
             "rotation must be finite",
         ),
         (
             c.eye.iter().all(|value| value.is_finite()),
-            "VUID-VkGaussianCameraGAURAST-eye-value",
+            "VUID-VkGaussianCameraGAURAST-eye-90065",
             "eye must be finite",
         ),
         (
             finite(&c.focal_length) && c.focal_length.iter().all(|&f| f > 0.0),
-            "VUID-VkGaussianCameraGAURAST-focalLength-value",
+            "VUID-VkGaussianCameraGAURAST-focalLength-90068",
             "focalLength must be finite and greater than 0",
         ),
         (
             finite(&c.principal_point),
-            "VUID-VkGaussianCameraGAURAST-principalPoint-value",
+            "VUID-VkGaussianCameraGAURAST-principalPoint-90066",
             "principalPoint must be finite",
         ),
         (
             (c.near_plane > 0.0 || model == CameraModel::Orthographic) && c.near_plane.is_finite(),
-            "VUID-VkGaussianCameraGAURAST-nearPlane-value",
+            "VUID-VkGaussianCameraGAURAST-nearPlane-90069",
             "nearPlane must be finite, and greater than 0 unless the camera is orthographic",
         ),
         (
             c.far_plane > c.near_plane,
-            "VUID-VkGaussianCameraGAURAST-farPlane-value",
+            "VUID-VkGaussianCameraGAURAST-farPlane-90070",
             "farPlane must be greater than nearPlane",
         ),
         (
             finite(&c.depth_coefficients),
-            "VUID-VkGaussianCameraGAURAST-depthCoefficients-value",
+            "VUID-VkGaussianCameraGAURAST-depthCoefficients-90067",
             "depthCoefficients must be finite",
         ),
     ];

@@ -46,7 +46,7 @@ fn range(
     });
     found.ok_or_else(|| {
         Error::usage(
-            "VUID-VkGaussianSphericalHarmonicsBufferGAURAST-deviceAddress-range",
+            "VUID-VkGaussianSphericalHarmonicsBufferGAURAST-deviceAddress-90016",
             format!("no buffer with an address holds {size} bytes at {address:#x}"),
         )
     })
@@ -61,7 +61,7 @@ fn format(format: vk::Format) -> Result<Format, Error> {
     });
     found.ok_or_else(|| {
         Error::usage(
-            "VUID-VkGaussianSphericalHarmonicsBufferGAURAST-format-value",
+            "VUID-VkGaussianSphericalHarmonicsBufferGAURAST-format-90017",
             format!(
                 "{format:?} is no format of vertex attributes that are no integers and have 3 components or more"
             ),

@@ -10,7 +10,7 @@ pub(crate) fn cmd_begin_gaussian_set(command_buffer: &CommandBuffer) -> Result<(
     command_buffer.record("vkCmdBeginGaussianSetGAURAST", |recorder| {
         if !is_enabled {
             return Err(Error::FeatureNotEnabled {
-                vuid: "VUID-vkCmdBeginGaussianSetGAURAST-mergedDraws-feature",
+                vuid: "VUID-vkCmdBeginGaussianSetGAURAST-mergedDraws-90001",
                 message: "a set of draws is begun, but the feature mergedDraws is not enabled"
                     .into(),
             });
@@ -18,7 +18,7 @@ pub(crate) fn cmd_begin_gaussian_set(command_buffer: &CommandBuffer) -> Result<(
         recorder.require_pass()?;
         if recorder.has_gaussian_set {
             return Err(Error::usage(
-                "VUID-vkCmdBeginGaussianSetGAURAST-set-begun",
+                "VUID-vkCmdBeginGaussianSetGAURAST-None-90002",
                 "the set that was begun before has not ended",
             ));
         }
@@ -32,7 +32,7 @@ pub(crate) fn cmd_begin_gaussian_set(command_buffer: &CommandBuffer) -> Result<(
 pub(crate) fn cmd_end_gaussian_set(recorder: &mut Recorder) -> Result<(), Error> {
     if !std::mem::take(&mut recorder.has_gaussian_set) {
         return Err(Error::usage(
-            "VUID-vkCmdEndGaussianSetGAURAST-set-begun",
+            "VUID-vkCmdEndGaussianSetGAURAST-None-90004",
             "no set was begun in this command buffer, or it has ended",
         ));
     }

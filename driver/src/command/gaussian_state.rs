@@ -41,7 +41,7 @@ pub(crate) fn cmd_set_gaussian_low_pass_variance(
     recorder: &mut Recorder,
     low_pass_variance: f32,
 ) -> Result<(), Error> {
-    let vuid = "VUID-vkCmdSetGaussianLowPassVarianceGAURAST-lowPassVariance-value";
+    let vuid = "VUID-vkCmdSetGaussianLowPassVarianceGAURAST-lowPassVariance-90053";
     values::LOW_PASS_VARIANCE.check(low_pass_variance, vuid)?;
     let variance = low_pass_variance;
     set(recorder, DynamicState::GaussianLowPassVariance { variance })
@@ -52,7 +52,7 @@ pub(crate) fn cmd_set_gaussian_alpha_floor(
     recorder: &mut Recorder,
     alpha_floor: f32,
 ) -> Result<(), Error> {
-    let vuid = "VUID-vkCmdSetGaussianAlphaFloorGAURAST-alphaFloor-value";
+    let vuid = "VUID-vkCmdSetGaussianAlphaFloorGAURAST-alphaFloor-90054";
     values::ALPHA_FLOOR.check(alpha_floor, vuid)?;
     set(
         recorder,
@@ -65,7 +65,7 @@ pub(crate) fn cmd_set_gaussian_alpha_ceiling(
     recorder: &mut Recorder,
     alpha_ceiling: f32,
 ) -> Result<(), Error> {
-    let vuid = "VUID-vkCmdSetGaussianAlphaCeilingGAURAST-alphaCeiling-value";
+    let vuid = "VUID-vkCmdSetGaussianAlphaCeilingGAURAST-alphaCeiling-90055";
     values::ALPHA_CEILING.check(alpha_ceiling, vuid)?;
     let ceiling = alpha_ceiling;
     set(recorder, DynamicState::GaussianAlphaCeiling { ceiling })
@@ -76,7 +76,7 @@ pub(crate) fn cmd_set_gaussian_transmittance_floor(
     recorder: &mut Recorder,
     transmittance_floor: f32,
 ) -> Result<(), Error> {
-    let vuid = "VUID-vkCmdSetGaussianTransmittanceFloorGAURAST-transmittanceFloor-value";
+    let vuid = "VUID-vkCmdSetGaussianTransmittanceFloorGAURAST-transmittanceFloor-90056";
     values::TRANSMITTANCE_FLOOR.check(transmittance_floor, vuid)?;
     let floor = transmittance_floor;
     set(recorder, DynamicState::GaussianTransmittanceFloor { floor })
@@ -90,7 +90,7 @@ pub(crate) fn cmd_set_gaussian_spherical_harmonics_degree(
     let degree = spherical_harmonics_degree;
     if degree > MAX_SPHERICAL_HARMONICS_DEGREE {
         return Err(Error::usage(
-            "VUID-vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST-sphericalHarmonicsDegree-value",
+            "VUID-vkCmdSetGaussianSphericalHarmonicsDegreeGAURAST-sphericalHarmonicsDegree-90057",
             format!(
                 "sphericalHarmonicsDegree is {degree}, but must be at most maxSphericalHarmonicsDegree \
                  ({MAX_SPHERICAL_HARMONICS_DEGREE})"
@@ -108,7 +108,7 @@ pub(crate) fn cmd_set_gaussian_exponential_error(
     recorder: &mut Recorder,
     exponential_error: f32,
 ) -> Result<(), Error> {
-    let vuid = "VUID-vkCmdSetGaussianExponentialErrorGAURAST-exponentialError-value";
+    let vuid = "VUID-vkCmdSetGaussianExponentialErrorGAURAST-exponentialError-90058";
     values::EXPONENTIAL_ERROR.check(exponential_error, vuid)?;
     let error = exponential_error;
     set(recorder, DynamicState::GaussianExponentialError { error })
@@ -119,7 +119,7 @@ pub(crate) fn cmd_set_gaussian_contribution_budget(
     recorder: &mut Recorder,
     contribution_budget: f32,
 ) -> Result<(), Error> {
-    let vuid = "VUID-vkCmdSetGaussianContributionBudgetGAURAST-contributionBudget-value";
+    let vuid = "VUID-vkCmdSetGaussianContributionBudgetGAURAST-contributionBudget-90059";
     values::CONTRIBUTION_BUDGET.check(contribution_budget, vuid)?;
     let budget = contribution_budget;
     set(

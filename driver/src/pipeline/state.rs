@@ -451,7 +451,7 @@ pub(crate) fn attribute(
 ) -> Result<AttributeSource, Error> {
     let refuse = |what: String| {
         Error::usage(
-            "VUID-VkGaussianAttributeLocationsGAURAST-location",
+            "VUID-VkGaussianAttributeLocationsGAURAST-None-90015",
             format!("{name} is location {location}, {what}"),
         )
     };

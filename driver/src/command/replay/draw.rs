@@ -28,7 +28,7 @@ pub(crate) enum DrawError {
     /// No camera of a view.
     #[error(
         "there are {cameras} cameras, and view {view} would have number {view}: there must be one for all views, or more \
-         than the greatest view index (VUID-vkCmdDraw-cameraCount-GAURAST)"
+         than the greatest view index (VUID-vkCmdDraw-cameraCount-90063)"
     )]
     CameraOfView {
         /// The view index.
@@ -44,7 +44,7 @@ pub(crate) enum DrawError {
     /// A camera of a model that Gaussians of the pipeline's modes cannot be seen by.
     #[error(
         "the pipeline's geometry and precision do not go with a camera whose model is {0:?} \
-         (VUID-vkCmdDraw-geometry-GAURAST)"
+         (VUID-vkCmdDraw-geometry-90071)"
     )]
     ModeOfCameraModel(CameraModel),
     /// No uniform buffer where the camera should be.
@@ -63,13 +63,13 @@ pub(crate) enum DrawError {
     /// Another pipeline than that of the set's first draw.
     #[error(
         "its pipeline is not that of the first draw of the set that vkCmdBeginGaussianSetGAURAST has begun \
-         (VUID-vkCmdDraw-set-pipeline-GAURAST)"
+         (VUID-vkCmdDraw-None-90005)"
     )]
     OtherPipelineInSet,
     /// Other state than that of the set's first draw.
     #[error(
         "cameras, viewport, scissor or dynamic state are not those of the first draw of the set that \
-         vkCmdBeginGaussianSetGAURAST has begun (VUID-vkCmdDraw-set-state-GAURAST)"
+         vkCmdBeginGaussianSetGAURAST has begun (VUID-vkCmdDraw-None-90006)"
     )]
     OtherStateInSet,
     /// No viewport.
@@ -91,13 +91,13 @@ pub(crate) enum DrawError {
     Dynamic(vk::DynamicState),
     /// Dynamic state whose values a pipeline could not have.
     #[error(
-        "a dynamic state was set to what the pipeline may not have: {0} (VUID-vkCmdDraw-dynamic-GAURAST)"
+        "a dynamic state was set to what the pipeline may not have: {0} (VUID-vkCmdDraw-dynamic-90060)"
     )]
     DynamicValue(String),
     /// No buffer of spherical harmonics.
     #[error(
         "no buffer of spherical harmonics is bound, which the pipeline's flags ask for \
-         (VUID-vkCmdDraw-sphericalHarmonicsBuffer-GAURAST)"
+         (VUID-vkCmdDraw-sphericalHarmonicsBuffer-90018)"
     )]
     Harmonics,
     /// Vertex input that the vertex program cannot read.

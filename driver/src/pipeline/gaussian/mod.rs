@@ -147,7 +147,7 @@ impl GaussianPipeline {
         require(features, TOPOLOGY, "the topology is the Gaussian list")?;
         let Some(gaussian) = &info.gaussian else {
             return Err(Error::usage(
-                "VUID-VkGraphicsPipelineCreateInfo-topology-GAURAST",
+                "VUID-VkGraphicsPipelineCreateInfo-topology-90007",
                 format!(
                     "a pipeline of topology VK_PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST must chain a \
                      {STRUCTURE}; if a validation layer is enabled, name the structure to it with \
@@ -355,7 +355,7 @@ fn camera_source(
     });
     if !is_there {
         return Err(Error::usage(
-            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-cameraBinding-layout",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-cameraBinding-90025",
             format!(
                 "{STRUCTURE}: the pipeline layout has no uniform buffer visible to the vertex stage at set {set}, \
                  binding {binding}, where cameraSet and cameraBinding want one"
@@ -366,7 +366,7 @@ fn camera_source(
     let views = u32::BITS - info.fragment_output.view_mask.leading_zeros();
     if count == 0 || count > 1 && count < views {
         return Err(Error::usage(
-            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-cameraCount-views",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-cameraCount-90026",
             format!(
                 "{STRUCTURE}: cameraCount is {count}, but must be 1, for all views, or greater than the greatest view \
                  index of view mask {:#b}",

@@ -45,7 +45,7 @@ impl VertexProjection {
     ) -> Result<Self, Error> {
         let stage = find(info, vk::ShaderStageFlags::VERTEX).ok_or_else(|| {
             Error::usage(
-                "VUID-VkGraphicsPipelineCreateInfo-projectionMode-GAURAST",
+                "VUID-VkGraphicsPipelineCreateInfo-projectionMode-90008",
                 "projectionMode is VERTEX_SHADER, and there is no vertex stage",
             )
         })?;
@@ -167,7 +167,7 @@ impl ResolveStage {
     }
 }
 
-const RESOLVE_INPUTS: &str = "VUID-VkGaussianResolveInputLocationsGAURAST-location";
+const RESOLVE_INPUTS: &str = "VUID-VkGaussianResolveInputLocationsGAURAST-None-90023";
 
 /// The numbers of what a resolve shader may read, by place.
 fn varyings(state: &PipelineGaussianStateCreateInfoGAURAST) -> Result<Varyings, Error> {
@@ -218,7 +218,7 @@ fn check_resolve(interface: &Interface, varyings: &Varyings) -> Result<(), Error
     });
     if writes_depth {
         return Err(Error::usage(
-            "VUID-VkGraphicsPipelineCreateInfo-FragDepth-GAURAST",
+            "VUID-VkGraphicsPipelineCreateInfo-FragDepth-90024",
             "the fragment shader writes FragDepth, but the depth of Gaussians is the median's",
         ));
     }
@@ -247,7 +247,7 @@ fn components(
     interface: &Interface,
 ) -> Result<Vec<InterfaceComponent>, Error> {
     let refuse = |what: String| {
-        let vuid = "VUID-VkGaussianVertexOutputLocationsGAURAST-location";
+        let vuid = "VUID-VkGaussianVertexOutputLocationsGAURAST-None-90020";
         Err(Error::usage(vuid, what))
     };
     let locations = &state.vertex_output_locations;

@@ -24,99 +24,99 @@ pub(super) type Feature = (fn(&Features) -> bool, &'static str, &'static str);
 pub(super) const TOPOLOGY: Feature = (
     |features| features.gaussian_primitive_topology,
     "gaussianPrimitiveTopology",
-    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianPrimitiveTopology-feature",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianPrimitiveTopology-90032",
 );
 pub(super) const VERTEX_SHADER_PROJECTION: Feature = (
     |features| features.vertex_shader_projection,
     "vertexShaderProjection",
-    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-vertexShaderProjection-feature",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-vertexShaderProjection-90033",
 );
 pub(super) const RESOLVE_FRAGMENT_SHADER: Feature = (
     |features| features.resolve_fragment_shader,
     "resolveFragmentShader",
-    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-resolveFragmentShader-feature",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-resolveFragmentShader-90034",
 );
 pub(super) const RADIAL_DISTANCE_ORDER: Feature = (
     |features| features.radial_distance_order,
     "radialDistanceOrder",
-    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-radialDistanceOrder-feature",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-radialDistanceOrder-90035",
 );
 pub(super) const PRIMITIVE_ORDER: Feature = (
     |features| features.primitive_order,
     "primitiveOrder",
-    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-primitiveOrder-feature",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-primitiveOrder-90036",
 );
 pub(super) const PER_PIXEL_ORDER: Feature = (
     |features| features.per_pixel_order,
     "perPixelOrder",
-    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-perPixelOrder-feature",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-perPixelOrder-90037",
 );
 pub(super) const RASTERIZATION_FLOAT16: Feature = (
     |features| features.rasterization_float16,
     "rasterizationFloat16",
-    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-rasterizationFloat16-feature",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-rasterizationFloat16-90038",
 );
 pub(super) const OPACITY_COMPENSATION: Feature = (
     |features| features.opacity_compensation,
     "opacityCompensation",
-    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-opacityCompensation-feature",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-opacityCompensation-90039",
 );
 pub(super) const UNSCENTED_PROJECTION: Feature = (
     |features| features.unscented_projection,
     "unscentedProjection",
-    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-unscentedProjection-feature",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-unscentedProjection-90040",
 );
 pub(super) const GAUSSIAN_2D: Feature = (
     |features| features.gaussian_2d,
     "gaussian2D",
-    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussian2D-feature",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussian2D-90041",
 );
 pub(super) const UNIFORM_BUFFER_CAMERA: Feature = (
     |features| features.uniform_buffer_camera,
     "uniformBufferCamera",
-    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-uniformBufferCamera-feature",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-uniformBufferCamera-90042",
 );
 pub(super) const INSTANCING: Feature = (
     |features| features.gaussian_instancing,
     "gaussianInstancing",
-    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianInstancing-feature",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianInstancing-90043",
 );
 pub(super) const DEPTH_STENCIL: Feature = (
     |features| features.gaussian_depth_stencil,
     "gaussianDepthStencil",
-    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianDepthStencil-feature",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianDepthStencil-90044",
 );
 pub(super) const MULTISAMPLE: Feature = (
     |features| features.gaussian_multisample,
     "gaussianMultisample",
-    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianMultisample-feature",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianMultisample-90045",
 );
 pub(super) const APPROXIMATION: Feature = (
     |features| features.gaussian_approximation,
     "gaussianApproximation",
-    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianApproximation-feature",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianApproximation-90050",
 );
 
 pub(super) const MULTIVIEW: Feature = (
     |features| features.gaussian_multiview,
     "gaussianMultiview",
-    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianMultiview-feature",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianMultiview-90049",
 );
 
 pub(super) const HARMONICS_BUFFER: Feature = (
     |features| features.spherical_harmonics_buffer,
     "sphericalHarmonicsBuffer",
-    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-sphericalHarmonicsBuffer-feature",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-sphericalHarmonicsBuffer-90047",
 );
 pub(super) const ATTRIBUTE_ACTIVATION: Feature = (
     |features| features.attribute_activation,
     "attributeActivation",
-    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-attributeActivation-feature",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-attributeActivation-90046",
 );
 pub(super) const DYNAMIC_STATE: Feature = (
     |features| features.gaussian_dynamic_state,
     "gaussianDynamicState",
-    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianDynamicState-feature",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianDynamicState-90048",
 );
 
 /// Refuses `what` unless its feature is enabled, which one that the device lacks never is.
@@ -197,38 +197,38 @@ impl Modes {
         let rules = [
             (
                 !shaded && self.is_placed && (per_pixel || flat),
-                "VUID-VkPipelineGaussianStateCreateInfoGAURAST-firstModelMatrix-modes",
+                "VUID-VkPipelineGaussianStateCreateInfoGAURAST-firstModelMatrix-90028",
                 "firstModelMatrix is used, but order is PER_PIXEL or geometry is GAUSSIAN_2D",
             ),
             (
                 !shaded && flat && self.is_linearized,
-                "VUID-VkPipelineGaussianStateCreateInfoGAURAST-geometry-linearization",
+                "VUID-VkPipelineGaussianStateCreateInfoGAURAST-geometry-90029",
                 "linearization is not JACOBIAN, but geometry is GAUSSIAN_2D, which is not linearized",
             ),
             (
                 flat && self.is_compensated,
-                "VUID-VkPipelineGaussianStateCreateInfoGAURAST-geometry-antialiasing",
+                "VUID-VkPipelineGaussianStateCreateInfoGAURAST-geometry-90027",
                 "antialiasing is OPACITY_COMPENSATED, but geometry is GAUSSIAN_2D, which is not dilated",
             ),
             (
                 half && (flat || per_pixel || shaded),
-                "VUID-VkPipelineGaussianStateCreateInfoGAURAST-precision-modes",
+                "VUID-VkPipelineGaussianStateCreateInfoGAURAST-precision-90030",
                 "precision is FLOAT16, but geometry is GAUSSIAN_2D, order is PER_PIXEL or projectionMode is \
                  VERTEX_SHADER, which are for FLOAT32",
             ),
             (
                 shaded && by_distance && !self.has_key,
-                "VUID-VkPipelineGaussianStateCreateInfoGAURAST-depthKey-order",
+                "VUID-VkPipelineGaussianStateCreateInfoGAURAST-depthKey-90021",
                 "order is RADIAL_DISTANCE, but depthKey is unused",
             ),
             (
                 shaded && per_pixel,
-                "VUID-VkPipelineGaussianStateCreateInfoGAURAST-projectionMode-order",
+                "VUID-VkPipelineGaussianStateCreateInfoGAURAST-projectionMode-90022",
                 "order is PER_PIXEL, but projectionMode is VERTEX_SHADER",
             ),
             (
                 self.reads_depth && (half || per_pixel),
-                "VUID-VkGaussianResolveInputLocationsGAURAST-depth-modes",
+                "VUID-VkGaussianResolveInputLocationsGAURAST-depth-90031",
                 "a fragment stage has depths for an input, but precision is FLOAT16 or order is PER_PIXEL, which \
                  accumulate none",
             ),
@@ -273,7 +273,7 @@ impl DynamicRules {
         ceiling_over_floor(state.alpha_floor, state.alpha_ceiling)?;
         if state.sh_degree > self.max_degree {
             return Err(Error::usage(
-                "VUID-vkCmdDraw-sphericalHarmonicsDegree-GAURAST",
+                "VUID-vkCmdDraw-sphericalHarmonicsDegree-90061",
                 format!(
                     "sphericalHarmonicsDegree was set to {}, but the pipeline has coefficients of degree {}",
                     state.sh_degree, self.max_degree
@@ -310,7 +310,7 @@ fn ceiling_over_floor(floor: f32, ceiling: f32) -> Result<(), Error> {
         return Ok(());
     }
     Err(Error::usage(
-        "VUID-VkPipelineGaussianStateCreateInfoGAURAST-alphaCeiling-value",
+        "VUID-VkPipelineGaussianStateCreateInfoGAURAST-alphaCeiling-90013",
         format!("alphaCeiling is {ceiling}, but must be at least alphaFloor, which is {floor}"),
     ))
 }
@@ -386,7 +386,7 @@ pub(super) fn stages(
     };
     if let Some(wrong) = wrong {
         return Err(Error::usage(
-            "VUID-VkGraphicsPipelineCreateInfo-projectionMode-GAURAST",
+            "VUID-VkGraphicsPipelineCreateInfo-projectionMode-90008",
             format!(
                 "projectionMode is {:?}, so the pipeline {wrong}",
                 gaussian.projection_mode
@@ -395,7 +395,7 @@ pub(super) fn stages(
     }
     if info.vertex_input.primitive_restart {
         return Err(Error::usage(
-            "VUID-VkPipelineInputAssemblyStateCreateInfo-topology-GAURAST",
+            "VUID-VkPipelineInputAssemblyStateCreateInfo-topology-90009",
             "primitiveRestartEnable is VK_TRUE, but the Gaussian list has no primitive restart",
         ));
     }
@@ -477,7 +477,7 @@ pub(super) fn distinct_locations(
             |(_, other): &&(&str, Range<u32>)| own.start < other.end && other.start < own.end;
         if let Some((earlier, _)) = used.iter().find(shared) {
             return Err(Error::usage(
-                "VUID-VkGaussianAttributeLocationsGAURAST-distinct",
+                "VUID-VkGaussianAttributeLocationsGAURAST-None-90019",
                 format!(
                     "{name} begins at location {first}, where {earlier} is: each needs locations of its own \
                      (VK_GAUSSIAN_LOCATION_UNUSED_GAURAST stands for none)"
@@ -495,7 +495,7 @@ pub(super) fn numbers(gaussian: &PipelineGaussianStateCreateInfoGAURAST) -> Resu
     let degree = g.spherical_harmonics_degree;
     if !is_shaded(g) && degree > MAX_SPHERICAL_HARMONICS_DEGREE {
         return Err(Error::usage(
-            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-sphericalHarmonicsDegree-value",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-sphericalHarmonicsDegree-90010",
             format!(
                 "{STRUCTURE}: sphericalHarmonicsDegree is {degree}, but must be at most \
                  maxSphericalHarmonicsDegree ({MAX_SPHERICAL_HARMONICS_DEGREE})"
@@ -504,20 +504,20 @@ pub(super) fn numbers(gaussian: &PipelineGaussianStateCreateInfoGAURAST) -> Resu
     }
     values::LOW_PASS_VARIANCE.check(
         g.low_pass_variance,
-        "VUID-VkPipelineGaussianStateCreateInfoGAURAST-lowPassVariance-value",
+        "VUID-VkPipelineGaussianStateCreateInfoGAURAST-lowPassVariance-90011",
     )?;
     values::ALPHA_FLOOR.check(
         g.alpha_floor,
-        "VUID-VkPipelineGaussianStateCreateInfoGAURAST-alphaFloor-value",
+        "VUID-VkPipelineGaussianStateCreateInfoGAURAST-alphaFloor-90012",
     )?;
     values::ALPHA_CEILING.check(
         g.alpha_ceiling,
-        "VUID-VkPipelineGaussianStateCreateInfoGAURAST-alphaCeiling-value",
+        "VUID-VkPipelineGaussianStateCreateInfoGAURAST-alphaCeiling-90013",
     )?;
     ceiling_over_floor(g.alpha_floor, g.alpha_ceiling)?;
     values::TRANSMITTANCE_FLOOR.check(
         g.transmittance_floor,
-        "VUID-VkPipelineGaussianStateCreateInfoGAURAST-transmittanceFloor-value",
+        "VUID-VkPipelineGaussianStateCreateInfoGAURAST-transmittanceFloor-90014",
     )
 }
 
@@ -598,13 +598,13 @@ pub(super) fn approximation(info: &GraphicsState) -> Result<GaussianApproximatio
     let mut own = GaussianApproximation::default();
     if !info.is_dynamic(S::GAUSSIAN_EXPONENTIAL_ERROR) {
         let vuid =
-            "VUID-VkPipelineGaussianApproximationStateCreateInfoGAURAST-exponentialError-value";
+            "VUID-VkPipelineGaussianApproximationStateCreateInfoGAURAST-exponentialError-90051";
         values::EXPONENTIAL_ERROR.check(given.exponential_error, vuid)?;
         own.exponential_error = given.exponential_error;
     }
     if !info.is_dynamic(S::GAUSSIAN_CONTRIBUTION_BUDGET) {
         let vuid =
-            "VUID-VkPipelineGaussianApproximationStateCreateInfoGAURAST-contributionBudget-value";
+            "VUID-VkPipelineGaussianApproximationStateCreateInfoGAURAST-contributionBudget-90052";
         values::CONTRIBUTION_BUDGET.check(given.contribution_budget, vuid)?;
         own.contribution_budget = given.contribution_budget;
     }
