@@ -1,8 +1,8 @@
 //! Device addresses: buffers reached by numbers, within their bounds.
 
 use ash::vk;
-use gaurast_tests::triangles::shader::{Stage, compile};
-use gaurast_tests::triangles::{Gpu, Kernel};
+use gaurast_testkit::shader::{Stage, compile};
+use gaurast_testkit::{Gpu, Kernel};
 
 use crate::GLSLANG;
 use crate::triangles::devices::own;

@@ -1,7 +1,7 @@
 //! Near and far planes that clip, or don't, whether or not depth is clamped.
 
 use ash::vk;
-use gaurast_tests::triangles::{
+use gaurast_testkit::{
     Buffer, Gpu, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex,
 };
 

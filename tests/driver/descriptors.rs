@@ -1,8 +1,8 @@
 //! Descriptor sets: arrays without a length, sets updated after they were bound, variable counts, inline uniform blocks.
 
 use ash::vk;
-use gaurast_tests::triangles::shader::{Stage, compile};
-use gaurast_tests::triangles::{Buffer, Gpu, Kernel};
+use gaurast_testkit::shader::{Stage, compile};
+use gaurast_testkit::{Buffer, Gpu, Kernel};
 
 use crate::GLSLANG;
 use crate::triangles::devices::own;

@@ -1,11 +1,12 @@
 //! Limits that programs ask for, reached.
 
 use ash::vk;
-use gaurast_tests::triangles::shader::{Stage, compile};
-use gaurast_tests::triangles::{
+use gaurast_testkit::shader::{Stage, compile};
+use gaurast_testkit::{
     Bindings, Buffer, Image, ImageOptions, Kernel, Pass, Pipeline, PipelineOptions, Resource,
-    Sampler, Target, TargetOptions, shapes,
+    Sampler, Target, TargetOptions,
 };
+use gaurast_tests::triangles::shapes;
 
 use crate::GLSLANG;
 use crate::triangles::devices::own;

@@ -1,11 +1,11 @@
 //! Passes with views: one draw renders every view to its layer, and no other layer is touched.
 
 use ash::vk;
-use gaurast_tests::triangles::{Bindings, Vertex};
-use gaurast_tests::triangles::{
+use gaurast_testkit::{Bindings, Vertex};
+use gaurast_testkit::{
     Buffer, Gpu, Image, ImageOptions, Pipeline, PipelineOptions, Resource, Target, TargetOptions,
-    shapes,
 };
+use gaurast_tests::triangles::shapes;
 
 use crate::GLSLANG;
 use crate::triangles::devices::own;
@@ -41,7 +41,7 @@ fn layered(gpu: &Gpu, usage: vk::ImageUsageFlags) -> Image {
         let value = vk::ClearColorValue {
             float32: [BEFORE; 4],
         };
-        let range = gaurast_tests::triangles::range(vk::ImageAspectFlags::COLOR);
+        let range = gaurast_testkit::range(vk::ImageAspectFlags::COLOR);
         // SAFETY: the image is alive and in that layout.
         unsafe {
             commands.device().cmd_clear_color_image(
@@ -141,7 +141,7 @@ fn run(
     gpu: &Gpu,
     pass: vk::RenderPass,
     views: &[vk::ImageView],
-    draw: &[&dyn Fn(&gaurast_tests::triangles::Commands)],
+    draw: &[&dyn Fn(&gaurast_testkit::Commands)],
 ) {
     let info = vk::FramebufferCreateInfo::default()
         .render_pass(pass)
@@ -245,7 +245,7 @@ fn views_are_loaded_by_the_first_subpass_that_has_them() {
     let image = layered(gpu, vk::ImageUsageFlags::COLOR_ATTACHMENT);
     let draw = |index: usize, buffer| {
         let pipeline: &Pipeline = &pipelines[index];
-        move |commands: &gaurast_tests::triangles::Commands| {
+        move |commands: &gaurast_testkit::Commands| {
             commands.bind(pipeline);
             commands.vertices(buffer);
             commands.draw(0..6);

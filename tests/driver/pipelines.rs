@@ -1,7 +1,7 @@
 //! Pipelines that may not be compiled, and caches.
 
 use ash::vk;
-use gaurast_tests::triangles::shader::{Stage, compile};
+use gaurast_testkit::shader::{Stage, compile};
 
 use crate::GLSLANG;
 use crate::triangles::devices::own;

@@ -1,7 +1,7 @@
 //! Queue families, and what a process may have of memory.
 
 use ash::vk;
-use gaurast_tests::triangles::{Buffer, Gpu};
+use gaurast_testkit::{Buffer, Gpu};
 
 use crate::triangles::devices::own;
 

@@ -1,8 +1,8 @@
 //! What is read and written beyond resources, and of descriptors that hold none.
 
 use ash::vk;
-use gaurast_tests::triangles::shader::{Stage, compile};
-use gaurast_tests::triangles::{Buffer, Gpu, Kernel};
+use gaurast_testkit::shader::{Stage, compile};
+use gaurast_testkit::{Buffer, Gpu, Kernel};
 
 use crate::GLSLANG;
 

@@ -1,9 +1,7 @@
 //! Samplers: anisotropic filtering, the least and the greatest of texels, border colours of one's own.
 
 use ash::vk;
-use gaurast_tests::triangles::{
-    Bindings, Buffer, Gpu, Image, ImageOptions, Kernel, Resource, Sampler,
-};
+use gaurast_testkit::{Bindings, Buffer, Gpu, Image, ImageOptions, Kernel, Resource, Sampler};
 
 use crate::GLSLANG;
 use crate::triangles::devices::own;

@@ -14,8 +14,8 @@ use std::error::Error;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
+use gaurast_testkit::Gpu;
 use gaurast_testkit::Settings;
-use gaurast_tests::triangles::Gpu;
 use gaurast_tests::triangles::workloads::{NAMES, Workload};
 
 /// Runs of each workload that are timed.

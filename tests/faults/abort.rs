@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, AtomicI64, Ordering::Relaxed};
 use ash::vk;
 use gaurast_runner::{Case, Variant};
 use gaurast_testkit::Settings;
-use gaurast_tests::triangles::{
+use gaurast_testkit::{
     Buffer, Gpu, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex, depth_test,
 };
 

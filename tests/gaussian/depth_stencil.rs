@@ -8,16 +8,16 @@ use gaurast::vk::{GaussianCameraGAURAST, GaussianOrderGAURAST};
 use gaurast_testkit::{
     Attachments, GaussianOptions, GaussianPipeline, GaussianScene, Settings, over,
 };
+use gaurast_testkit::{
+    Buffer, Commands, Gpu, Output, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex,
+    depth_test,
+};
 use gaurast_tests::compare::{Limits, assert_contract};
 use gaurast_tests::hybrid::{Held, depth_format, held};
 use gaurast_tests::oracle::{
     OracleCamera, OracleStencil, OracleTests, TestedReference, render_tested,
 };
 use gaurast_tests::scenes::{self, SceneBuffers};
-use gaurast_tests::triangles::{
-    Buffer, Commands, Gpu, Output, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex,
-    depth_test,
-};
 
 use crate::GLSLANG;
 

@@ -8,15 +8,15 @@ use gaurast::vk::GaussianCameraGAURAST;
 use gaurast_runner::{Need, data};
 use gaurast_scene::Scene;
 use gaurast_scene::camera::DEFAULT_FOV;
+use gaurast_testkit::{
+    Buffer, Gpu, Output, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex, depth_test,
+};
 use gaurast_testkit::{GaussianOptions, GaussianPipeline, GaussianScene, Settings, for_people};
 use gaurast_tests::compare::{Limits, assert_contract};
 use gaurast_tests::hybrid::{Held, ToClip, depth_format, held};
 use gaurast_tests::oracle::{OracleCamera, OracleTests, render_tested, sample_tests::compare};
 use gaurast_tests::scenes::SceneBuffers;
 use gaurast_tests::triangles::models::Model;
-use gaurast_tests::triangles::{
-    Buffer, Gpu, Output, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex, depth_test,
-};
 use glam::{DMat3, DVec3, Vec3};
 
 use super::PLAYBOT;

@@ -3,9 +3,9 @@
 
 use ash::vk;
 use gaurast_runner::{Case, Need, Variant};
+use gaurast_testkit::Gpu;
 use gaurast_testkit::Settings;
 use gaurast_tests::recorded::{Agreement, read};
-use gaurast_tests::triangles::Gpu;
 
 use super::hybrid_scenes::{GARDEN, WITH_PLAYBOT, What, garden, playbot};
 use super::interleavings;

@@ -12,7 +12,7 @@ use timing_studies::what_if::{WhatIf, each_alone, what_ifs};
 use crate::hybrid::ToClip;
 use crate::recorded::read;
 use crate::scenes::SceneBuffers;
-use crate::triangles::{
+use gaurast_testkit::{
     Buffer, Gpu, Output, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex, depth_test,
 };
 use gaurast_testkit::{GaussianOptions, GaussianPipeline, GaussianScene, Settings};

@@ -1,9 +1,10 @@
 //! Which samples triangles cover: a million of all kinds, clipped ones, and meshes.
 
 use gaurast_runner::{Case, Need, Variant, shards};
+use gaurast_testkit::Gpu;
 use gaurast_tests::triangles::checksum::{Checksums, first_difference, numbers};
 use gaurast_tests::triangles::edges::{Position, is_near, lines, to_clip};
-use gaurast_tests::triangles::{Gpu, shapes};
+use gaurast_tests::triangles::shapes;
 use rand::Rng;
 use rand::seq::IndexedRandom;
 use rand_chacha::ChaCha8Rng;

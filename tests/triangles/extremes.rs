@@ -2,10 +2,11 @@
 //! thousands of layers in one plane, textures at the edges of their address modes.
 
 use ash::vk;
-use gaurast_tests::triangles::{
+use gaurast_testkit::{
     Bindings, Buffer, Gpu, Image, ImageOptions, Pass, Pipeline, PipelineOptions, Resource, Sampler,
-    Target, TargetOptions, Vertex, blend, depth_test, shapes,
+    Target, TargetOptions, Vertex, blend, depth_test,
 };
+use gaurast_tests::triangles::shapes;
 
 use super::devices::own;
 use crate::GLSLANG;

@@ -3,10 +3,11 @@
 
 use ash::vk;
 use gaurast_runner::Need;
-use gaurast_tests::triangles::{
+use gaurast_testkit::{
     Buffer, Gpu, Image, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex, depth_test,
-    fetch_sample, shapes,
+    fetch_sample,
 };
+use gaurast_tests::triangles::shapes;
 
 use rand::Rng;
 

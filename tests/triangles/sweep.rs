@@ -6,8 +6,9 @@ use std::path::Path;
 
 use gaurast_runner::{Case, Missing, Need, Variant, ignore, require};
 use gaurast_testkit::{Difference, differences, for_people, write_differences};
+use gaurast_testkit::{Gpu, Output};
 use gaurast_tests::triangles::models::Model;
-use gaurast_tests::triangles::{Expected, Gpu, Output, Scene, scenes};
+use gaurast_tests::triangles::{Expected, Scene, scenes};
 
 use super::devices::{lavapipe, loaded, own};
 use crate::GLSLANG;

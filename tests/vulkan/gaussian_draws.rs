@@ -42,7 +42,8 @@ fn alpha_becomes_coverage_without_a_fragment_stage() {
         let request = Graphics {
             multisample: splats()
                 .multisample
-                .alpha_to_coverage_enable(alpha_to_coverage),
+                .alpha_to_coverage_enable(alpha_to_coverage)
+                .alpha_to_one_enable(alpha_to_coverage),
             ..splats()
         };
         let scene = Scene::new(&gaussians, &request);

@@ -23,6 +23,9 @@ const EXPECTED: &[&str] = &[
     "VUID-VkGraphicsPipelineCreateInfo-stageCount-06604",
 ];
 
+/// The layer's advice on speed: the testkit keeps every image in one layout.
+const ADVICE: &str = "For optimal performance";
+
 #[gaurast_runner::test(needs = [Need::ValidationLayer])]
 fn a_draw_is_as_it_is_without_the_layer(case: &Case) {
     through_the_loader(case, || {
@@ -43,7 +46,7 @@ fn a_draw_is_as_it_is_without_the_layer(case: &Case) {
         let ids: BTreeSet<_> = messages.iter().map(|message| id(message)).collect();
         let unexpected: Vec<_> = messages
             .iter()
-            .filter(|message| !EXPECTED.contains(&id(message)))
+            .filter(|message| !EXPECTED.contains(&id(message)) && !message.contains(ADVICE))
             .collect();
         assert!(unexpected.is_empty(), "{unexpected:#?}");
         let layer_was_there = "VUID-VkPipelineInputAssemblyStateCreateInfo-topology-parameter";

@@ -6,7 +6,7 @@
 
 use ash::vk;
 
-use super::{
+use gaurast_testkit::{
     Buffer, Gpu, Pass, Pipeline, PipelineOptions, Target, TargetOptions, attribute, binding, blend,
     fetch_sample,
 };

@@ -14,12 +14,5 @@ pub mod shapes;
 pub mod workloads;
 
 pub use expected::{Exception, Expected};
-pub use gaurast_testkit::shader;
-pub use gaurast_testkit::target::{Target, TargetOptions, fetch_sample};
-pub use gaurast_testkit::{
-    Bindings, Buffer, Commands, FRAGMENT, Gpu, Image, ImageOptions, Kernel, OpenError, Output,
-    Pass, Picture, Pipeline, PipelineOptions, Recorded, Resource, Sampler, VERTEX, Vertex,
-    accurate_lavapipe, aspects, attribute, binding, blend, depth_test, opaque, range, texel_size,
-};
 pub use outcome::{Drawn, Missing};
 pub use scenes::Scene;

@@ -9,9 +9,10 @@ use image::RgbaImage;
 use ply_rs_bw::parser::Parser;
 use ply_rs_bw::ply::{DefaultElement, Property};
 
-use super::{
-    Bindings, Buffer, Commands, Gpu, Image, ImageOptions, Missing, Pipeline, PipelineOptions,
-    Resource, Sampler, Target, attribute, binding, depth_test,
+use super::Missing;
+use gaurast_testkit::{
+    Bindings, Buffer, Commands, Gpu, Image, ImageOptions, Pipeline, PipelineOptions, Resource,
+    Sampler, Target, attribute, binding, depth_test,
 };
 
 /// A corner of a model's triangle.

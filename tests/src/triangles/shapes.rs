@@ -3,7 +3,7 @@
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::Vertex;
+use gaurast_testkit::Vertex;
 
 /// A source of numbers that is the same everywhere.
 pub fn rng(seed: u64) -> ChaCha8Rng {

@@ -5,9 +5,10 @@ use glam::Vec3;
 use rand::Rng;
 
 use super::models::{Model, Ready};
-use super::{
-    Bindings, Buffer, Gpu, Image, ImageOptions, Missing, Pass, Pipeline, PipelineOptions, Recorded,
-    Resource, Sampler, Target, TargetOptions, Vertex, blend, depth_test, shapes,
+use super::{Missing, shapes};
+use gaurast_testkit::{
+    Bindings, Buffer, Gpu, Image, ImageOptions, Pass, Pipeline, PipelineOptions, Recorded,
+    Resource, Sampler, Target, TargetOptions, Vertex, blend, depth_test,
 };
 
 /// The names of all workloads.

@@ -6,9 +6,8 @@ use ash::vk::BlendOp as Op;
 
 use super::Drawn;
 use super::simple::{cases, need, need_format, simple};
-use crate::triangles::{
-    Gpu, Output, PipelineOptions, TargetOptions, Vertex, blend, opaque, shapes,
-};
+use crate::triangles::shapes;
+use gaurast_testkit::{Gpu, Output, PipelineOptions, TargetOptions, Vertex, blend, opaque};
 
 const FACTORS: [Factor; 15] = [
     Factor::ZERO,

@@ -4,9 +4,10 @@ use ash::vk;
 
 use super::Drawn;
 use super::simple::cases;
-use crate::triangles::{
+use crate::triangles::shapes;
+use gaurast_testkit::{
     Buffer, Commands, Gpu, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex, blend,
-    depth_test, shapes,
+    depth_test,
 };
 
 const D32: vk::Format = vk::Format::D32_SFLOAT;

@@ -5,9 +5,9 @@ use ash::vk::CompareOp as Compare;
 
 use super::Drawn;
 use super::simple::{cases, need, need_format, simple};
-use crate::triangles::{
-    Buffer, Gpu, Output, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex,
-    depth_test, shapes,
+use crate::triangles::shapes;
+use gaurast_testkit::{
+    Buffer, Gpu, Output, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex, depth_test,
 };
 
 const D32: vk::Format = vk::Format::D32_SFLOAT;

@@ -5,7 +5,7 @@ use glam::Vec3;
 
 use super::Drawn;
 use crate::triangles::models::{Model, Ready};
-use crate::triangles::{Gpu, Output, Pass, Target, TargetOptions};
+use gaurast_testkit::{Gpu, Output, Pass, Target, TargetOptions};
 
 fn drawn(gpu: &Gpu, model: &Model, direction: Vec3, samples: u32) -> Output {
     let options = TargetOptions {

@@ -4,8 +4,9 @@ use ash::vk;
 
 use super::Drawn;
 use super::simple::{need, simple};
-use crate::triangles::{
-    Buffer, Gpu, Pass, Pipeline, PipelineOptions, Target, TargetOptions, depth_test, shapes,
+use crate::triangles::shapes;
+use gaurast_testkit::{
+    Buffer, Gpu, Pass, Pipeline, PipelineOptions, Target, TargetOptions, depth_test,
 };
 
 fn four() -> TargetOptions {
@@ -195,7 +196,7 @@ pub fn samples_loaded_again(gpu: &Gpu) -> Drawn {
 
 /// One sample is the same whether or not the image could hold more.
 pub fn lines_and_points_of_four_samples(gpu: &Gpu) -> Drawn {
-    let mut output = crate::triangles::Output::default();
+    let mut output = gaurast_testkit::Output::default();
     for topology in [
         vk::PrimitiveTopology::POINT_LIST,
         vk::PrimitiveTopology::LINE_LIST,

@@ -4,9 +4,10 @@ use ash::vk;
 
 use super::Drawn;
 use super::simple::need_format;
-use crate::triangles::{
+use crate::triangles::shapes;
+use gaurast_testkit::{
     Bindings, Buffer, Commands, Gpu, Pipeline, PipelineOptions, Resource, Target, TargetOptions,
-    depth_test, shapes,
+    depth_test,
 };
 
 /// A render pass with a framebuffer.

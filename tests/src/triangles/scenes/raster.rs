@@ -4,7 +4,8 @@ use ash::vk;
 
 use super::Drawn;
 use super::simple::{cases, need, simple, with};
-use crate::triangles::{FRAGMENT, Gpu, PipelineOptions, TargetOptions, depth_test, shapes};
+use crate::triangles::shapes;
+use gaurast_testkit::{FRAGMENT, Gpu, PipelineOptions, TargetOptions, depth_test};
 
 /// Culling of each face, for each winding of front faces.
 pub fn culling(gpu: &Gpu) -> Drawn {

@@ -4,9 +4,10 @@ use ash::vk;
 
 use super::Drawn;
 use super::simple::{cases, need};
-use crate::triangles::{
+use crate::triangles::shapes;
+use gaurast_testkit::{
     Bindings, Buffer, Gpu, Output, Pass, Pipeline, PipelineOptions, Resource, Target,
-    TargetOptions, Vertex, attribute, binding, shapes,
+    TargetOptions, Vertex, attribute, binding,
 };
 
 /// Colours in a vertex format of their own, from a second binding.
@@ -284,7 +285,7 @@ pub fn fragments_write_storage(gpu: &Gpu) -> Drawn {
         commands.vertices(&vertices);
         commands.draw(0..90);
     });
-    output.pictures.push(crate::triangles::Picture {
+    output.pictures.push(gaurast_testkit::Picture {
         name: "counts".to_owned(),
         format: vk::Format::R32_UINT,
         size: [128, 128],

@@ -4,7 +4,8 @@ use ash::vk;
 
 use super::Drawn;
 use super::simple::simple;
-use crate::triangles::{Gpu, Output, PipelineOptions, TargetOptions, shapes};
+use crate::triangles::shapes;
+use gaurast_testkit::{Gpu, Output, PipelineOptions, TargetOptions};
 
 fn fragment(gpu: &Gpu, seed: u64, source: &str) -> Output {
     let options = PipelineOptions {

@@ -3,7 +3,7 @@
 use ash::vk;
 
 use super::Missing;
-use crate::triangles::{
+use gaurast_testkit::{
     Buffer, Commands, Gpu, Output, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex,
 };
 

@@ -5,9 +5,10 @@ use rand::Rng;
 
 use super::Drawn;
 use super::simple::{cases, need, need_format};
-use crate::triangles::{
+use crate::triangles::shapes;
+use gaurast_testkit::{
     Bindings, Buffer, Gpu, Image, ImageOptions, Output, Pass, Pipeline, PipelineOptions, Resource,
-    Sampler, Target, TargetOptions, shapes,
+    Sampler, Target, TargetOptions,
 };
 
 const RGBA8: vk::Format = vk::Format::R8G8B8A8_UNORM;

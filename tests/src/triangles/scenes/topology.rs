@@ -5,8 +5,9 @@ use ash::vk::PrimitiveTopology as Topology;
 
 use super::Drawn;
 use super::simple::{cases, need, simple, with};
-use crate::triangles::{
-    Buffer, Gpu, Output, PipelineOptions, TargetOptions, Vertex, attribute, binding, shapes,
+use crate::triangles::shapes;
+use gaurast_testkit::{
+    Buffer, Gpu, Output, PipelineOptions, TargetOptions, Vertex, attribute, binding,
 };
 
 fn of(topology: Topology) -> PipelineOptions<'static> {
