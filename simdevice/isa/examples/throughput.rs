@@ -1,4 +1,4 @@
-//! How fast the shader cores run: an arithmetic loop and a divergent one, at every SIMD level of this processor.
+//! Measures the shader cores' speed: an arithmetic loop and a divergent one, at every SIMD level of this processor.
 //!
 //! `cargo run --release -p isa --example throughput`
 
@@ -13,7 +13,7 @@ use isa::machine::{Executable, LaneMask, Machine, Watchdog};
 use isa::op::Op;
 use isa::resources::Resources;
 
-/// 100 rounds of sixteen fused multiply-adds in four chains.
+/// A program of 100 iterations of sixteen fused multiply-adds in four chains.
 fn arithmetic() -> Program {
     let mut b = Builder::new();
     let x = b.input(0, Type::B32, Rate::Varying);
@@ -48,7 +48,7 @@ fn arithmetic() -> Program {
     b.finish().expect("a valid program")
 }
 
-/// The number of iterations until a point escapes, at most 256.
+/// A program that counts the iterations until a point escapes the Mandelbrot iteration, at most 256.
 fn mandelbrot() -> Program {
     let mut b = Builder::new();
     let cx = b.input(0, Type::B32, Rate::Varying);
@@ -85,7 +85,7 @@ fn mandelbrot() -> Program {
     b.finish().expect("a valid program")
 }
 
-/// Runs batches for a while; returns lanes a second and the work of one pass.
+/// Runs batches for a while. Returns lanes a second and the work of one pass.
 fn measure(program: &Program, level: SimdLevel, lanes: usize) -> Option<(f64, f64, f64)> {
     let options = Options {
         lanes,
@@ -142,7 +142,7 @@ fn measure(program: &Program, level: SimdLevel, lanes: usize) -> Option<(f64, f6
 }
 
 fn main() {
-    // Only the lines that contain these words, if any are given.
+    // The lines to print: those that contain one of these words; all, if none is given.
     let wanted: Vec<String> = std::env::args().skip(1).collect();
     for (name, program) in [("arithmetic", arithmetic()), ("mandelbrot", mandelbrot())] {
         for (level_name, level) in SimdLevel::supported() {

@@ -1,14 +1,15 @@
-//! What a program reaches besides its registers: buffers, push constants, images, global memory.
+//! The resources of a program outside its registers: buffers, push constants, images, global memory.
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use crate::ir::{AtomicOp, ImageShape, VECTOR_LANES};
 use devmem::BufferRange;
 
-/// What a program is bound to while it runs.
+/// The buffers, push constants, images and device addresses that a program uses while it runs.
 #[derive(Clone, Copy)]
 pub struct Resources<'a> {
-    /// Buffers by bind point; None, or beyond the end, is a buffer of size zero. Offsets are multiples of 4.
+    /// Buffers by bind point. A bind point that is None or beyond the end is a buffer of size zero. Offsets are
+    /// multiples of 4.
     pub buffers: &'a [Option<BufferRange>],
     /// Push constants, as [`words`] makes them.
     pub push_constants: &'a [AtomicU32],
@@ -41,13 +42,13 @@ pub fn words(bytes: &[u8]) -> Vec<AtomicU32> {
         .collect()
 }
 
-/// Device addresses of 64 bits: virtual ranges that buffers occupy.
+/// Maps device addresses of 64 bits to the buffers at them.
 pub trait GlobalMemory: Sync {
     /// The buffer that an address lies in, and the address of the buffer's first byte. None if it lies in none.
     fn find(&self, address: u64) -> Option<(&BufferRange, u64)>;
 }
 
-/// No buffer has an address.
+/// Global memory in which no buffer has an address.
 #[derive(Clone, Copy, Debug)]
 pub struct NoGlobalMemory;
 
@@ -77,7 +78,7 @@ pub(crate) fn range_words(range: &BufferRange) -> (&[AtomicU32], u32) {
     }
 }
 
-/// A word, if the slice has it.
+/// The word at an index. None if it is beyond the end.
 #[inline(always)]
 pub(crate) fn load_word(words: &[AtomicU32], index: usize) -> Option<u32> {
     words.get(index).map(|word| word.load(Ordering::Relaxed))
@@ -86,25 +87,25 @@ pub(crate) fn load_word(words: &[AtomicU32], index: usize) -> Option<u32> {
 /// One register for the 16 lanes of a vector; floats as their bits.
 pub type LaneWords = [u32; VECTOR_LANES];
 
-/// How the level of detail of a sample is chosen; see [`crate::ir::Lod`].
+/// The level of detail of a sample for 16 lanes; see [`crate::ir::Lod`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(
     clippy::large_enum_variant,
     reason = "one lives on the stack for each sample"
 )]
 pub enum LodRequest {
-    /// From differences within each quad of lanes, and nothing else: as [`LodRequest::Implicit`] with zeros.
+    /// Computed from differences within each quad of lanes, and nothing else: as [`LodRequest::Implicit`] with zeros.
     Automatic,
-    /// From differences within each quad of lanes.
+    /// Computed from differences within each quad of lanes.
     Implicit {
         /// Added to the level; floats.
         bias: LaneWords,
         /// Least level; floats.
         minimum: LaneWords,
     },
-    /// Given; floats.
+    /// The level itself; floats.
     Explicit(LaneWords),
-    /// From gradients by coordinate; floats.
+    /// Computed from the gradients of each coordinate; floats.
     Gradient {
         /// Along x.
         dx: [LaneWords; 3],
@@ -122,7 +123,7 @@ pub struct SampleRequest {
     pub mask: u16,
     /// The image's kind.
     pub shape: ImageShape,
-    /// Floats; the layer, if any, after the other coordinates; the rest is zero.
+    /// Coordinates as floats. The layer, if any, follows the other coordinates; the rest is zero.
     pub coordinate: [LaneWords; 4],
     /// Level of detail.
     pub lod: LodRequest,
@@ -141,7 +142,7 @@ pub struct TexelRequest {
     pub mask: u16,
     /// The image's kind.
     pub shape: ImageShape,
-    /// Integers; the layer, if any, after the other coordinates; the rest is zero.
+    /// Coordinates as integers. The layer, if any, follows the other coordinates; the rest is zero.
     pub coordinate: [LaneWords; 4],
     /// Mip levels.
     pub level: LaneWords,
@@ -149,10 +150,10 @@ pub struct TexelRequest {
     pub sample: LaneWords,
 }
 
-/// The images and samplers that a program is bound to. Indices are bind points; one that isn't bound, or coordinates
-/// out of range, read zero and write nothing. Results are floats or integers as the image's format says.
+/// The images and samplers that a program is bound to, by bind point. If a bind point isn't bound, or coordinates are
+/// out of range, reads give zero and writes do nothing. Results are floats or integers as the image's format says.
 pub trait ImageUnit: Sync {
-    /// Filters. Returns red, green, blue, alpha.
+    /// Samples with filtering. Returns red, green, blue, alpha.
     fn sample(&self, image: u32, sampler: u32, request: &SampleRequest) -> [LaneWords; 4];
 
     /// Reads texels. Returns red, green, blue, alpha.
@@ -171,7 +172,7 @@ pub trait ImageUnit: Sync {
         comparator: &LaneWords,
     ) -> LaneWords;
 
-    /// Width, height, depth as far as the dimension has them, then layers if arrayed; the rest is zero.
+    /// Width, height and depth, as many as the dimension has; then layers if arrayed; the rest is zero.
     fn size(&self, image: u32, shape: ImageShape, level: u32) -> [u32; 4];
 
     /// Number of mip levels.
@@ -180,11 +181,11 @@ pub trait ImageUnit: Sync {
     /// Number of samples.
     fn samples(&self, image: u32) -> u32;
 
-    /// The level of detail of an implicit sample, clamped to what exists, and before clamping; floats.
+    /// The level of detail of an implicit sample: clamped to the levels that exist, and before clamping; floats.
     fn lod(&self, image: u32, sampler: u32, request: &SampleRequest) -> [LaneWords; 2];
 }
 
-/// No image is bound.
+/// An image unit to which no image is bound.
 #[derive(Clone, Copy, Debug)]
 pub struct NoImages;
 

@@ -9,7 +9,7 @@ use crate::ir::{Reg, Register, Role};
 #[derive(Debug, Default)]
 pub struct Products {
     by_register: HashMap<Reg, Product>,
-    /// The straight run of statements without assignments that is being built.
+    /// The number of the current run of statements without assignments.
     segment: u32,
 }
 
@@ -17,12 +17,12 @@ pub struct Products {
 #[derive(Clone, Copy, Debug)]
 struct Product {
     factors: [Reg; 2],
-    /// The straight run of statements that it is in.
+    /// The number of the run that it is in.
     segment: u32,
 }
 
 impl Products {
-    /// Ends a straight run of statements: variables may have changed after it.
+    /// Ends a run of statements: variables may have changed after it.
     pub fn end_segment(&mut self) {
         self.segment += 1;
     }
@@ -34,8 +34,8 @@ impl Products {
             .insert(product, Product { factors, segment });
     }
 
-    /// The fused operation, with its operands, of a sum or difference one of whose operands is a product. None if there
-    /// is no such operand, or the product's factors hold something else by now.
+    /// The operation and operands that fuse a sum or difference with a product among its operands. None if no operand
+    /// is a product, or a factor may have changed since.
     pub fn fuse(&self, registers: &[Register], op: Op, src: &[Reg]) -> Option<(Op, [Reg; 3])> {
         let (of_left, of_right) = match op {
             Op::FAdd => (Op::FFma, Op::FFma),
@@ -50,7 +50,7 @@ impl Products {
         Some((of_right, [x, y, a]))
     }
 
-    /// The factors of a product, if they still hold what they held.
+    /// The factors of a product. None if a factor may have changed since.
     fn factors(&self, registers: &[Register], product: Reg) -> Option<[Reg; 2]> {
         let Product { factors, segment } = *self.by_register.get(&product)?;
         let is_value = |reg: &Reg| {

@@ -1,4 +1,4 @@
-//! Values that outlive their loop.
+//! Values that are used after their loop.
 //!
 //! An instruction computes all lanes, also those that have left the loop around it. So a value that is read after its
 //! loop must be kept in a variable, which keeps, for each lane, the value of the last iteration that the lane was in.

@@ -155,14 +155,14 @@ impl Builder {
         self.constant(Type::Bool, u64::from(value))
     }
 
-    /// Declares an input. Each slot once.
+    /// Declares an input. A slot can be declared once.
     pub fn input(&mut self, slot: u32, ty: Type, rate: Rate) -> Reg {
         let reg = self.value(ty);
         self.program.inputs.push(Input { slot, reg, rate });
         reg
     }
 
-    /// Declares an output, a variable. Each slot once.
+    /// Declares an output, a variable. A slot can be declared once.
     pub fn output(&mut self, slot: u32, ty: Type) -> Reg {
         let reg = self.variable(ty);
         self.program.outputs.push(Output { slot, reg });
@@ -174,8 +174,7 @@ impl Builder {
         allocate(&mut self.program.shared_bytes, bytes, align)
     }
 
-    /// Reserves private memory of each lane and returns its byte offset, a multiple of 4 (8 for 64-bit elements is not
-    /// needed).
+    /// Reserves private memory of each lane and returns its byte offset, a multiple of 4. 64-bit elements need no more.
     pub fn allocate_private(&mut self, bytes: u32) -> u32 {
         allocate(
             &mut self.program.private_bytes,
@@ -184,7 +183,7 @@ impl Builder {
         )
     }
 
-    /// Appends a statement as it is.
+    /// Appends a statement unchanged.
     pub fn statement(&mut self, statement: Statement) {
         if matches!(statement, Statement::Assign { .. }) {
             self.products.end_segment();
@@ -192,7 +191,7 @@ impl Builder {
         self.program.body.push(statement);
     }
 
-    /// `op(src...)`.
+    /// Appends `op(src...)` and returns its value.
     pub fn compute(&mut self, op: Op, src: &[Reg]) -> Reg {
         let dst = self.value(op.signature().result);
         self.statement(Statement::Compute {
@@ -204,8 +203,8 @@ impl Builder {
     }
 
     /// Like [`Builder::compute`], where fusing is allowed (not under SPIR-V's `NoContraction`): `FAdd` and `FSub` of a
-    /// product that was itself computed by this method become `FFma`, `FMulSub` or `FNegMulAdd`. The product goes if
-    /// nothing else uses it.
+    /// product that was itself computed by this method become `FFma`, `FMulSub` or `FNegMulAdd`. The product is removed
+    /// if nothing else uses it.
     pub fn compute_contracted(&mut self, op: Op, src: &[Reg]) -> Reg {
         if let Some((fused, operands)) = self.products.fuse(&self.program.registers, op, src) {
             return self.compute(fused, &operands);
@@ -222,7 +221,7 @@ impl Builder {
         self.statement(Statement::Assign { dst, src });
     }
 
-    /// Assignments at once: every source is read before any destination is written. (Phis of one block.)
+    /// Parallel assignments: every source is read before any destination is written. (Phis of one block.)
     pub fn assign_parallel(&mut self, pairs: &[(Reg, Reg)]) {
         let mut pairs: Vec<(Reg, Reg)> = pairs
             .iter()
@@ -237,7 +236,7 @@ impl Builder {
                 let (dst, src) = pairs.swap_remove(free);
                 self.assign(dst, src);
             } else {
-                // Only cycles are left: break one with a copy.
+                // Only cycles are left: a copy breaks one.
                 let held = pairs[0].1;
                 let copy = self.variable(self.type_of(held));
                 self.assign(copy, held);
@@ -362,7 +361,7 @@ impl Builder {
         self.push(Construct::Then { condition });
     }
 
-    /// Closes that branch and opens the other. Optional.
+    /// Closes the branch of lanes with true and opens that of lanes with false. Optional.
     pub fn begin_else(&mut self) {
         match self.pop() {
             Some((before, Construct::Then { condition }, then)) => {
@@ -528,7 +527,7 @@ impl Builder {
         self.statement(Statement::Demote);
     }
 
-    /// The program, valid.
+    /// Returns the program, validated.
     ///
     /// Values that are used outside the loop that defines them become variables here, so that each lane keeps the
     /// value of its own last iteration.

@@ -1,9 +1,9 @@
-//! Gives each register a place in the register file, so that what is live fits in the first-level cache.
+//! Register allocation: gives each register a place in the register file, so that live registers fit in the L1 cache.
 
 use crate::ir::{Block, Program, Rate, Reg, Role, Statement, Type};
 use crate::kernels::registers::RegisterSlot;
 
-/// Where everything lives.
+/// The places of all registers.
 pub struct Allocation {
     /// Each register's place.
     pub slots: Vec<RegisterSlot>,
@@ -11,17 +11,18 @@ pub struct Allocation {
     pub vectors: usize,
 }
 
-/// When a register is live, in ticks: two for each statement, its reads and then its writes.
+/// The live range of a register, in ticks: two for each statement, its reads and then its writes.
 #[derive(Clone, Copy)]
 struct Interval {
     start: u32,
     end: u32,
 }
 
-/// Allocates the registers of a program, for batches of `width` vectors. `varying` says which have a value for each lane.
+/// Allocates the registers of a program, for batches of `width` vectors. `varying` says which have a value for each
+/// lane.
 ///
-/// Constants and uniform inputs have places of their own, so that they need to be set only once. Everything else shares
-/// places with what isn't live at the same time.
+/// Constants and uniform inputs have places of their own, so that they are set only once. Other registers share places
+/// if they are not live at the same time.
 pub fn allocate(program: &Program, varying: &[bool], width: usize) -> Allocation {
     let count = program.registers.len();
     let mut liveness = Liveness {
@@ -64,7 +65,7 @@ pub fn allocate(program: &Program, varying: &[bool], width: usize) -> Allocation
     }
 }
 
-/// Walks the intervals by start, and takes places from those that have ended.
+/// Visits the intervals in order of their start, and reuses the places of those that have ended.
 fn scan(
     program: &Program,
     varying: &[bool],
@@ -100,7 +101,7 @@ fn is_wide(program: &Program, reg: Reg) -> bool {
     program.registers[reg.0 as usize].ty == Type::B64
 }
 
-/// Registers of one class are interchangeable.
+/// A class of registers, whose places are interchangeable.
 #[derive(Clone, Copy)]
 struct Class {
     varying: bool,
@@ -166,7 +167,7 @@ impl Liveness<'_> {
         let reads = self.tick;
         let writes = reads + 1;
         self.tick += 2;
-        // Only what works lane by lane may write where it reads.
+        // Only a statement that works lane by lane may write its result over its operand.
         let by_lane = matches!(
             statement,
             Statement::Compute { .. } | Statement::Assign { .. }
@@ -182,7 +183,7 @@ impl Liveness<'_> {
             self.block(block);
         }
         if let Statement::Switch { selector, .. } = statement {
-            // The selector is looked at again for each case.
+            // Each case reads the selector again.
             self.touch(*selector, self.tick);
         }
         if let Statement::Loop { .. } = statement {
@@ -191,7 +192,7 @@ impl Liveness<'_> {
         self.tick += 2;
     }
 
-    /// What a loop reads of values from before, and the variables in it, live until its end.
+    /// Extends to the end of a loop the values from before it that it reads, and the variables in it.
     fn extend_over_loop(&mut self, statement: &Statement, start: u32, end: u32) {
         for block in statement.blocks() {
             for inner in block {

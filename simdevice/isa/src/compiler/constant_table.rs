@@ -1,8 +1,8 @@
 //! Private memory that is a table of constants.
 //!
-//! Shaders index constant arrays at run time. Such an array reaches the device as private memory that is filled before it
-//! is used. Where that is all that a program does with private memory, one table serves all lanes and batches, and a load
-//! from an address that is uniform is uniform.
+//! Shaders index constant arrays at run time. Such an array reaches the device as private memory that is filled before
+//! it is used. If the program uses private memory for nothing else, one table serves all lanes and batches, and a load
+//! from a uniform address is uniform.
 
 use crate::ir::{Address, Block, Format, Program, Reg, Space, Statement};
 use std::collections::HashMap;
@@ -30,7 +30,7 @@ pub fn promote_constants(program: &mut Program) -> Option<Vec<u32>> {
 struct Search {
     known: HashMap<Reg, u64>,
     words: Vec<u32>,
-    /// Whether stores may come no more: a lane may have loaded, or left.
+    /// True once stores are no longer allowed: a lane may have loaded, or left.
     filled: bool,
 }
 
@@ -70,7 +70,7 @@ impl Search {
         }
     }
 
-    /// Fills in what a store stores; None unless that and the place are constant.
+    /// Writes a store's values to the table. None if a value or the address isn't constant.
     fn store(&mut self, src: &[Reg], address: &Address, format: Format) -> Option<()> {
         let base = match address.base {
             Some(base) => *self.known.get(&base)?,

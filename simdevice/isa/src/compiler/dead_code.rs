@@ -1,4 +1,4 @@
-//! Removes what nobody reads.
+//! Dead code elimination.
 
 use crate::ir::{Block, Program, Reg, Statement};
 
@@ -16,7 +16,7 @@ pub fn remove_dead(program: &mut Program) {
     program.inputs.retain(|input| live[input.reg.0 as usize]);
 }
 
-/// Reports whether a statement must stay though nothing reads its results.
+/// Reports whether a statement must stay even if nothing reads its results.
 fn has_effect(statement: &Statement) -> bool {
     !matches!(
         statement,
@@ -34,7 +34,7 @@ fn has_effect(statement: &Statement) -> bool {
     )
 }
 
-/// Marks what live statements read, from the last to the first; true if that found anything new.
+/// Marks the registers that live statements read, from the last to the first. Returns true if it marked a new one.
 fn mark(block: &Block, live: &mut [bool]) -> bool {
     let mut found = false;
     for statement in block.iter().rev() {
@@ -81,7 +81,7 @@ fn sweep(block: &mut Block, live: &[bool]) {
     });
 }
 
-/// Drops results that nothing reads; false if none is left.
+/// Drops results that nothing reads. Returns false if none is left.
 fn keep_live(dst: &mut [Option<Reg>; 4], live: &[bool]) -> bool {
     for reg in dst.iter_mut() {
         *reg = reg.filter(|reg| live[reg.0 as usize]);

@@ -1,4 +1,4 @@
-//! Folds constants and shares repeated computations.
+//! Constant folding and common subexpressions.
 
 use std::collections::HashMap;
 
@@ -86,7 +86,7 @@ impl Folding {
         }
     }
 
-    /// A register that already holds, or can hold beforehand, what a computation gives.
+    /// A register that already holds a computation's result, or a constant for it.
     fn replacement(&mut self, op: Op, dst: Reg, src: &[Reg]) -> Option<Reg> {
         let known: Option<Vec<u64>> = src.iter().map(|reg| self.known.get(reg).copied()).collect();
         if let Some(operands) = known {

@@ -1,9 +1,9 @@
-//! Lets the caller read outputs where they were computed, where else each batch would copy them.
+//! Lets the caller read outputs from the registers that compute them, which saves a copy in each batch.
 
 use crate::ir::{Block, Program, Reg, Role, Statement};
 
-/// Makes outputs that all lanes assign once, to a value of each lane, that value. `varying` says which registers have a
-/// value for each lane.
+/// Replaces each output that all lanes assign once by the varying value assigned to it. `varying` says which registers
+/// have a value for each lane.
 pub fn forward(program: &mut Program, varying: &[bool]) {
     let stay = program.body.iter().position(leaves);
     let stay = stay.unwrap_or(program.body.len());
@@ -34,13 +34,13 @@ pub fn forward(program: &mut Program, varying: &[bool]) {
     program.body.retain(|_| copied.next() != Some(true));
 }
 
-/// Reports whether lanes may end in a statement.
+/// Reports whether lanes may return or be killed in a statement.
 fn leaves(statement: &Statement) -> bool {
     matches!(statement, Statement::Return | Statement::Kill)
         || statement.blocks().into_iter().flatten().any(leaves)
 }
 
-/// How many statements assign to a variable.
+/// The number of statements that assign to a variable.
 fn assignments(block: &Block, variable: Reg) -> usize {
     let of = |statement: &Statement| {
         let own = usize::from(statement.definitions().contains(&variable));
@@ -59,7 +59,7 @@ mod tests {
     use crate::compiler::uniformity::varying_registers;
     use crate::ir::{Rate, Type};
 
-    /// Reports whether the only output of a program is read where it was computed.
+    /// Reports whether the only output of a program is read from the register that computes it.
     fn is_forwarded(rate: Rate, write: impl FnOnce(&mut Builder, Reg, Reg)) -> bool {
         let mut builder = Builder::new();
         let input = builder.input(0, Type::B32, rate);

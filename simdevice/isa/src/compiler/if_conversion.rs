@@ -5,10 +5,10 @@ use std::collections::HashMap;
 use crate::ir::op::{Kind, Op};
 use crate::ir::{Block, Program, Reg, Register, Role, Statement, Type};
 
-/// The most computations in a branch that both sides may run instead of one.
+/// The most computations in a branch for which running both sides is better than a branch.
 const SHORT: usize = 6;
 
-/// Replaces each branch that only computes a little and assigns variables.
+/// Replaces each short branch, which only computes and assigns variables, by selections.
 pub fn convert_branches(program: &mut Program) {
     let Program {
         registers, body, ..
@@ -57,7 +57,7 @@ fn is_short(then: &Block, otherwise: &Block, registers: &[Register]) -> bool {
     computations <= SHORT && !both().any(|statement| statement.uses().into_iter().any(is_assigned))
 }
 
-/// Appends what a short branch does, without branching.
+/// Appends the computations of both sides of a short branch, and selections of their results.
 fn flatten(
     to: &mut Block,
     condition: Reg,

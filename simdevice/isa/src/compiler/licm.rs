@@ -1,10 +1,10 @@
-//! Takes out of loops what is the same in every round, and loads once what is loaded again.
+//! Loop-invariant code motion, and sharing of repeated loads.
 
 use std::collections::{HashMap, HashSet};
 
 use crate::ir::{Address, Block, Format, Program, Reg, Register, Role, Space, Statement};
 
-/// Moves and shares computations and loads.
+/// Moves loop-invariant computations out of loops, and shares repeated loads.
 pub fn move_invariants(program: &mut Program) {
     load_push_constants_first(program);
     let mut sharing = Sharing {
@@ -15,7 +15,7 @@ pub fn move_invariants(program: &mut Program) {
     move_out_of_loops(&mut program.body, &program.registers);
 }
 
-/// Loads each push constant that has a known place once, at the beginning: nobody writes them.
+/// Loads each push constant at a constant offset once, at the beginning: a program can't write them.
 fn load_push_constants_first(program: &mut Program) {
     let mut pushed = Pushed {
         known: program
@@ -67,7 +67,7 @@ impl Pushed<'_> {
         });
     }
 
-    /// The known place of an access to push constants.
+    /// The constant offset of an access to push constants, if it has one.
     fn start(&self, address: &Address) -> Option<u32> {
         if address.space != Space::PushConstants {
             return None;
@@ -108,7 +108,7 @@ fn replace_uses(statement: &mut Statement, alias: &HashMap<Reg, Reg>) {
     });
 }
 
-/// Finds loads of what a load just before, in the same block, has loaded.
+/// Finds loads that an earlier load in the same block has done, with no write to memory in between.
 struct Sharing<'a> {
     registers: &'a [Register],
     alias: HashMap<Reg, Reg>,
@@ -141,7 +141,7 @@ impl Sharing<'_> {
                     }
                 }
                 Statement::Compute { .. } | Statement::Assign { .. } => {}
-                // Memory may change.
+                // Memory may change here.
                 _ => loaded.clear(),
             }
             true
@@ -178,7 +178,7 @@ fn move_out_of_loops(block: &mut Block, registers: &[Register]) {
     }
 }
 
-/// Moves what depends on nothing in `defined` from a loop's block to the end of another.
+/// Moves statements that read nothing in `defined` from a loop's block to the end of another block.
 fn take_invariant(
     block: &mut Block,
     registers: &[Register],

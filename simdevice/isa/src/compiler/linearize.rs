@@ -9,11 +9,11 @@ use crate::ir::op::{Kind, Op};
 use crate::ir::{Block, Case, Label, Program, Reg, Statement, Type};
 use crate::kernels::registers::RegisterSlot;
 
-/// Steps and what belongs to them.
+/// The linear form of a program: its steps, masks and costs.
 pub struct Linearized {
     /// The steps; the last is [`Step::End`].
     pub steps: Vec<Step>,
-    /// Masks used.
+    /// The number of masks.
     pub masks: usize,
     /// The cost of each counted run.
     pub runs: Vec<RunCost>,
@@ -43,10 +43,10 @@ pub fn linearize(program: &Program, allocation: &Allocation, count: bool) -> Lin
     linearizer.patch_targets()
 }
 
-/// A place in the steps that isn't known yet: an index into the marks.
+/// A jump target that isn't known yet: an index into the marks.
 type Mark = u32;
 
-/// Where lanes go that leave a construct.
+/// The exits of a construct: the masks of the lanes that leave it.
 #[derive(Clone, Copy)]
 struct Exits {
     breaks: MaskId,
@@ -58,19 +58,19 @@ struct Linearizer<'a> {
     allocation: &'a Allocation,
     count: bool,
     steps: Vec<Step>,
-    /// Where each mark is.
+    /// The step of each mark.
     marks: Vec<Target>,
     free_mask: u16,
     masks: usize,
     constructs: HashMap<Label, Exits>,
     runs: Vec<RunCost>,
-    /// The run that instructions are being added to.
+    /// The counted run to which instructions are being added.
     run: Option<usize>,
-    /// Variables that only a loop looks at.
+    /// Variables that only a loop reads, by the loop's label.
     loop_private: HashMap<Label, HashSet<Reg>>,
-    /// Variables to which assignments, where the linearizer is now, need no mask.
+    /// Variables that can be assigned without a mask at this place.
     unmasked: HashSet<Reg>,
-    /// How often each register is read.
+    /// The number of reads of each register.
     uses: Vec<u32>,
 }
 
@@ -128,7 +128,7 @@ impl Linearizer<'_> {
         self.program.registers[reg.0 as usize].ty
     }
 
-    /// Replaces marks by the places that they mark.
+    /// Replaces the marks in jumps by their steps.
     fn patch_targets(mut self) -> Linearized {
         for step in &mut self.steps {
             if let Some(target) = step.target_mut() {
@@ -142,13 +142,14 @@ impl Linearizer<'_> {
         }
     }
 
-    /// Linearizes a block. `empty` is where to go when no lane is active: it is before, or at, a place where lanes come back.
+    /// Linearizes a block. `empty` is the jump target when no lane is active: before, or at, a place where lanes are
+    /// activated again.
     fn block(&mut self, block: &Block, empty: Mark) {
         let unmasked = std::mem::take(&mut self.unmasked);
         self.block_of_loop(block, empty, unmasked);
     }
 
-    /// Linearizes a block in which assignments to some variables need no mask.
+    /// Linearizes a block in which some variables can be assigned without a mask.
     fn block_of_loop(&mut self, block: &Block, empty: Mark, unmasked: HashSet<Reg>) {
         let mut rest = block.iter().peekable();
         while let Some(statement) = rest.next() {
@@ -280,7 +281,7 @@ impl Linearizer<'_> {
         self.instruction(Step::Compute { op, dst, src }, op.kind(), !dst.is_varying());
     }
 
-    /// The mask that lanes go to which leave by this statement.
+    /// The mask that collects the lanes which leave by this statement.
     fn exit(&self, statement: &Statement) -> MaskId {
         match statement {
             Statement::Break(label) => self
@@ -378,13 +379,13 @@ impl Linearizer<'_> {
         if let Some(continues) = continues {
             self.control(Step::Clear(continues));
         }
-        // No statement may run without lanes: it would still set uniform registers.
+        // Statements must not run without lanes: they would still set uniform registers.
         let back = if continues.is_some() {
             at_continuing
         } else {
             end
         };
-        // Lanes that continue early must keep what they have until then.
+        // Lanes that continue early must keep the values that they have then.
         let private = self.loop_private.remove(&label).unwrap_or_default();
         let in_body = if continues.is_some() {
             HashSet::new()
@@ -492,7 +493,7 @@ fn leaves(statement: &Statement) -> bool {
     )
 }
 
-/// How often each register is read.
+/// The number of reads of each register.
 fn count_uses(program: &Program) -> Vec<u32> {
     fn count(block: &Block, uses: &mut [u32]) {
         for statement in block {
@@ -521,7 +522,7 @@ fn contains(block: &Block, wanted: &Statement) -> bool {
     })
 }
 
-/// What a statement that isn't arithmetic costs.
+/// The kind of a statement that isn't arithmetic.
 fn kind_of(statement: &Statement) -> Kind {
     match statement {
         Statement::Compute { op, .. } => op.kind(),

@@ -25,10 +25,10 @@ use crate::kernels::registers::RegisterSlot;
 use linearize::Linearized;
 use step::{RunCost, Step};
 
-/// The most vectors that a register file may have: 256 MiB.
+/// The most vectors in a register file: 256 MiB.
 const MAX_VECTORS: usize = 1 << 22;
 
-/// How a program shall run.
+/// Options of a program's compilation: the batch's lanes, the subgroup size, counting, and the SIMD level.
 #[derive(Clone, Copy, Debug)]
 pub struct Options {
     /// Lanes of a batch: a multiple of 16, at most [`MAX_LANES`].
@@ -36,14 +36,14 @@ pub struct Options {
     /// Lanes of a subgroup: a power of two, at least 4 and at most [`MAX_SUBGROUP_SIZE`]. The last subgroup of a batch may
     /// be smaller.
     pub subgroup_size: usize,
-    /// Whether to count the work done (see [`crate::machine::Machine::take_work`]).
+    /// True to count the work done (see [`crate::machine::Machine::take_work`]).
     pub count_work: bool,
     /// The SIMD level of the kernels.
     pub level: Level,
 }
 
 impl Options {
-    /// Batches and subgroups of 64 lanes; nothing is counted.
+    /// Options for batches and subgroups of 64 lanes, without counting.
     pub fn new(level: Level) -> Self {
         Self {
             lanes: 64,
@@ -54,10 +54,10 @@ impl Options {
     }
 }
 
-/// A program as steps for batches of a fixed number of lanes, and what a machine needs to run them.
+/// A program as steps for batches of a fixed number of lanes, with the data that a machine needs to run them.
 #[derive(Debug)]
 pub struct CompiledProgram {
-    /// What is run, in order but for jumps.
+    /// The steps, in order of execution except for jumps.
     pub steps: Vec<Step>,
     /// Each register's place in the register file.
     pub slots: Vec<RegisterSlot>,
@@ -73,7 +73,7 @@ pub struct CompiledProgram {
     pub cleared: Vec<Reg>,
     /// The cost of each counted run.
     pub runs: Vec<RunCost>,
-    /// Masks used.
+    /// The number of masks.
     pub masks: usize,
     /// Vectors of the register file.
     pub vectors: usize,
@@ -85,7 +85,7 @@ pub struct CompiledProgram {
     pub shared_bytes: u32,
     /// Bytes of private memory of each lane.
     pub private_bytes: u32,
-    /// What private memory holds, if that is the same in all lanes at all times.
+    /// The contents of private memory, if they are the same in all lanes at all times.
     pub table: Option<Vec<AtomicU32>>,
 }
 

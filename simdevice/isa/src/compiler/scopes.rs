@@ -1,4 +1,4 @@
-//! Scopes of variables: the part of the tree of statements that each is used in.
+//! Scopes of variables: the part of the statement tree in which each is used.
 
 use std::collections::{HashMap, HashSet};
 
@@ -6,27 +6,28 @@ use crate::ir::{Block, Label, Program, Reg, Role, Statement};
 
 /// The scope of each variable.
 ///
-/// A variable's scope is the innermost block around all that reads or assigns it, if the block's first statement that does
-/// so assigns it at once. Whatever lanes enter the scope then find nothing of what lanes did there earlier: only masks that
-/// change within the scope matter to the variable. Else the scope is the whole program.
+/// A variable's scope is the innermost block around all statements that read or assign it, if the first of them in the
+/// block assigns it unconditionally. A lane that enters the scope then reads nothing from an earlier visit: only masks
+/// that change within the scope matter to the variable. Otherwise the scope is the whole program.
 pub struct VariableScopes {
     variables: HashMap<Reg, Uses>,
 }
 
-/// A block's place in the statement around it: which statement (counted in order of appearance), and which of its blocks.
+/// A block's place in the statement around it: the statement's number in order of appearance, and the block's index in
+/// it.
 type Step = (usize, usize);
 
 struct Uses {
     /// The path to the scope: blocks, outermost first.
     scope: Vec<Step>,
-    /// How many constructs are around the scope; none if it is the whole program.
+    /// The number of constructs around the scope; none if it is the whole program.
     depth: usize,
     /// The labelled constructs around all reads.
     around_reads: Option<Vec<Label>>,
 }
 
 impl VariableScopes {
-    /// How many constructs are around a variable's scope.
+    /// The number of constructs around a variable's scope.
     pub fn depth(&self, variable: Reg) -> usize {
         self.variables.get(&variable).map_or(0, |uses| uses.depth)
     }
@@ -48,7 +49,7 @@ pub fn variable_scopes(program: &Program) -> VariableScopes {
         labels: Vec::new(),
         statements: 0,
     };
-    // The caller sets and reads outputs: they are in scope in the whole program.
+    // The caller sets and reads outputs: their scope is the whole program.
     for output in &program.outputs {
         search.touch(output.reg);
         search.read(output.reg);
@@ -136,7 +137,7 @@ struct FirstUse<'a> {
     scopes: &'a mut VariableScopes,
     path: Vec<Step>,
     statements: usize,
-    /// Constructs around this place, as uniformity analysis counts them: a switch's cases are branches in it.
+    /// Constructs around this place. As in uniformity analysis, a switch's cases are branches in it.
     depth: usize,
 }
 
@@ -183,11 +184,11 @@ fn label_of(statement: &Statement) -> Option<Label> {
     }
 }
 
-/// For each loop, the variables that only the loop looks at: those that are read only within it, and that every lane which enters it has assigned just
-/// before (in the block that the loop is in).
+/// For each loop, the variables that only the loop reads, and that every lane which enters it has assigned just before,
+/// in the block that the loop is in.
 ///
-/// An assignment acts on active lanes alone, because lanes that have left a loop may read the variable later. Where they
-/// can't, the mask is not needed: the result may go straight to the variable, in all lanes.
+/// An assignment normally needs a mask, because lanes that have left a loop may read the variable later. These
+/// variables need none: their new values may be written in all lanes.
 pub fn loop_private_variables(program: &Program) -> HashMap<Label, HashSet<Reg>> {
     let mut reads = HashMap::new();
     count_reads(program, &program.body, &mut reads);

@@ -2,7 +2,7 @@
 
 use crate::ir::{Block, Program, Register, Role, Statement};
 
-/// How many statements [`sink`] looks back over.
+/// The number of statements before an assignment in which [`sink`] looks for the computation.
 const NEARBY: usize = 64;
 
 /// Moves each computation whose result is only assigned to a variable to just before that assignment, so that the two can
@@ -36,7 +36,7 @@ fn sink_block(block: &mut Block, registers: &[Register]) {
             registers[operand.0 as usize].role == Role::Value
                 || !between.iter().any(|other| other.writes(operand))
         });
-        // Lanes that leave in between may need the result where they come back.
+        // Lanes that leave in between may need the result at the place where they go.
         let all_stay = between.iter().all(keeps_lanes);
         if movable && all_stay && !between.iter().any(|other| other.reads(src)) {
             block[from..at].rotate_left(1);

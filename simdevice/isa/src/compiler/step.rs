@@ -1,10 +1,10 @@
-//! Steps in a row, with jumps: the form of a program that machines run.
+//! Steps: the linear form of a program, with jumps, that machines run.
 
 use crate::ir::op::{Kind, Op};
 use crate::ir::{Statement, Type};
 use crate::kernels::registers::RegisterSlot;
 
-/// The index of a mask within a machine's.
+/// The index of one of a machine's masks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MaskId(pub u16);
 
@@ -15,11 +15,11 @@ impl MaskId {
     pub const HELPER: Self = Self(1);
     /// The lanes that were killed or demoted.
     pub const KILLED: Self = Self(2);
-    /// Lanes that are done; nobody reads it.
+    /// The lanes that are done. It is never read.
     pub const DONE: Self = Self(3);
-    /// The lanes that were active when the batch began; the others never matter.
+    /// The lanes that were active when the batch began.
     pub const ENTRY: Self = Self(4);
-    /// The first that constructs may use.
+    /// The first mask that constructs may use.
     pub const FIRST_FREE: u16 = 5;
 }
 
@@ -54,50 +54,50 @@ pub enum Step {
         src: RegisterSlot,
         ty: Type,
     },
-    /// Anything that reaches across lanes or out of the registers.
+    /// Any statement that reads other lanes or accesses memory.
     Other(Box<Statement>),
-    /// A straight run of instructions begins: counts it and the active lanes.
+    /// The begin of a counted run: counts an execution and the active lanes.
     Count(u32),
 
-    /// Goes there.
+    /// Jumps to the target.
     Jump(Target),
-    /// Goes there if a uniform condition is false.
+    /// Jumps to the target if a uniform condition is false.
     Unless {
         condition: RegisterSlot,
         target: Target,
     },
-    /// `other = active & !condition; active &= condition`; goes there if no lane is left.
+    /// `other = active & !condition; active &= condition`; jumps to the target if no lane is left.
     If {
         condition: RegisterSlot,
         other: MaskId,
         target: Target,
     },
-    /// Exchanges `active` and `other`; goes there if no lane is left.
+    /// Exchanges `active` and `other`; jumps to the target if no lane is left.
     Else { other: MaskId, target: Target },
     /// `mask = {}`.
     Clear(MaskId),
-    /// `active |= mask`; goes there if that is empty.
+    /// `active |= mask`; jumps to the target if that is empty.
     Join { mask: MaskId, target: Target },
-    /// `into |= active; active = {}`; goes there.
+    /// `into |= active; active = {}`; jumps to the target.
     Leave { into: MaskId, target: Target },
-    /// The active lanes whose condition equals `when` move to `into`; goes there if none is left.
+    /// Moves the active lanes whose condition equals `when` to `into`; jumps to the target if none is left.
     LeaveIf {
         condition: RegisterSlot,
         when: bool,
         into: MaskId,
         target: Target,
     },
-    /// Goes there, the loop's head, if any lane is active; asks the watchdog.
+    /// Jumps to the loop's head if any lane is active; checks the watchdog.
     Repeat(Target),
-    /// `entered = active; active = {}; unmatched =` lanes of it whose selector is none of `values`.
+    /// `entered = active; active = {}; unmatched =` the lanes of `entered` whose selector is none of `values`.
     Switch {
         selector: RegisterSlot,
         values: Box<[u32]>,
         entered: MaskId,
         unmatched: MaskId,
     },
-    /// Activates also the lanes of `entered` whose selector is one of `values`, and those of `unmatched` if that's given;
-    /// goes there if no lane is active.
+    /// Activates also the lanes of `entered` whose selector is one of `values`, and those of `unmatched` if given;
+    /// jumps to the target if no lane is active.
     Case {
         selector: RegisterSlot,
         values: Box<[u32]>,
@@ -105,11 +105,11 @@ pub enum Step {
         unmatched: Option<MaskId>,
         target: Target,
     },
-    /// Active lanes are killed and done; goes there.
+    /// Kills the active lanes, which are done; jumps to the target.
     Kill(Target),
-    /// Active lanes are killed and become helpers.
+    /// Kills the active lanes and makes them helpers.
     Demote,
-    /// The end.
+    /// The end of the program.
     End,
 }
 
@@ -132,10 +132,10 @@ impl Step {
     }
 }
 
-/// What a straight run of instructions costs each time it runs, by [`Kind`].
+/// The instructions of a counted run, by [`Kind`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RunCost {
-    /// Instructions on varying registers.
+    /// Instructions on varying registers, executed for all lanes.
     pub varying: [u32; Kind::COUNT],
     /// Instructions computed once for all lanes.
     pub uniform: [u32; Kind::COUNT],

@@ -1,14 +1,14 @@
-//! Which registers hold the same value in all lanes. Such a register is kept, and computed, once a batch.
+//! Uniformity analysis: finds registers with the same value in all lanes. They are kept, and computed, once a batch.
 
 use super::scopes::{VariableScopes, variable_scopes};
 use crate::ir::{Block, Label, Program, Rate, Reg, Space, Statement};
 
-/// For each register, whether it may differ between lanes of a batch.
+/// True for each register that may differ between lanes of a batch.
 ///
-/// A value is uniform if it is computed from uniform values. A variable is uniform if all that is assigned to it is, and
-/// no assignment can be masked for a lane that reads it later: none lies in a branch on a varying condition within the
-/// variable's scope (see [`VariableScopes`]), or in a construct there that some lanes leave before others and outside which it is
-/// read. (Lanes that return don't come back.)
+/// A value is uniform if it is computed from uniform values. A variable is uniform if every value assigned to it is,
+/// and no assignment can be masked for a lane that reads it later. For that, no assignment may lie in a branch on a
+/// varying condition within the variable's scope (see [`VariableScopes`]), nor in a construct there that some lanes
+/// leave before others and outside which it is read. (Lanes that return don't come back.)
 ///
 /// `private_is_uniform` says that private memory holds the same in all lanes.
 pub fn varying_registers(program: &Program, private_is_uniform: bool) -> Vec<bool> {
@@ -37,7 +37,7 @@ pub fn varying_registers(program: &Program, private_is_uniform: bool) -> Vec<boo
     search.varying
 }
 
-/// A construct around the statement being looked at.
+/// A construct around the statement being analysed.
 enum Around {
     /// A branch on a varying condition.
     Varying,
@@ -47,7 +47,7 @@ enum Around {
     Labelled(Label),
     /// A loop's body.
     Body(Label),
-    /// What a loop does before the next round.
+    /// A loop's continuing part, which runs before the next iteration.
     Continuing(Label),
 }
 
@@ -81,13 +81,14 @@ impl Search {
         self.varying[reg.0 as usize]
     }
 
-    /// Reports whether lanes may be inactive here for reasons that lie within the innermost `depth` constructs.
+    /// Reports whether lanes may be inactive here because of the innermost `depth` constructs.
     fn masked_within(&self, depth: usize) -> bool {
         let mut within = self.open.iter().rev().take(depth);
         within.any(|around| self.masks(around, |label| self.left.contains(&label)))
     }
 
-    /// Reports whether a construct masks what is in it. `left` says whether it counts that lanes break out of one.
+    /// Reports whether a construct masks its statements. `left` says whether a break of some lanes out of a label
+    /// counts.
     fn masks(&self, around: &Around, left: impl Fn(Label) -> bool) -> bool {
         match around {
             Around::Varying => true,
@@ -100,7 +101,7 @@ impl Search {
     /// Reports whether an assignment here may be masked for a lane that reads the variable later.
     fn assigned_by_some(&self, variable: Reg) -> bool {
         let scope = self.scopes.depth(variable).min(self.open.len());
-        // Within a loop, lanes come back to what they left.
+        // Within a loop, lanes return to statements that they have left.
         let mut repeated = false;
         self.open[scope..].iter().any(|around| {
             let masked = self.masks(around, |label| {
@@ -122,7 +123,7 @@ impl Search {
         self.open.pop();
     }
 
-    /// Reports whether only some of the lanes in the construct get here, where they leave it.
+    /// Reports whether only some lanes of the construct reach this place, where they leave it.
     fn diverges(&self, label: Label) -> bool {
         let mut around = self.open.iter().rev();
         let depth = around.position(|around| around.label() == Some(label));
@@ -168,7 +169,7 @@ impl Search {
             }
             Statement::Scope { label, body } => self.within(Around::Labelled(*label), body),
             Statement::Break(label) => {
-                // Lanes that continued aren't here, so those that are leave before them.
+                // Lanes that continued early are not active here, so those that break here leave before them.
                 let diverges = self.diverges(*label) || self.continued.contains(label);
                 if diverges && !self.left.contains(label) {
                     self.left.push(*label);
@@ -202,7 +203,7 @@ impl Search {
         }
     }
 
-    /// Reports whether a statement's results may differ between lanes though its operands don't.
+    /// Reports whether a statement's results may differ between lanes even if its operands don't.
     fn differs_by_itself(&self, statement: &Statement) -> bool {
         match statement {
             Statement::Load { address, .. } => {

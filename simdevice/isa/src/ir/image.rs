@@ -19,7 +19,7 @@ pub enum Dimension {
 }
 
 impl Dimension {
-    /// How many coordinates address a texel, without the layer.
+    /// The number of coordinates that address a texel, without the layer.
     pub fn coordinates(self) -> usize {
         match self {
             Self::D1 | Self::Buffer => 1,
@@ -29,38 +29,38 @@ impl Dimension {
     }
 }
 
-/// What kind of image an instruction expects. All operand registers of image statements are `B32`.
+/// The kind of image that an instruction expects. All operand registers of image statements are `B32`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct ImageShape {
     /// Its dimension.
     pub dimension: Dimension,
-    /// Whether it has layers; the layer is the last coordinate. (For storage cubes, face and layer are one: 6 layer +
+    /// True if it has layers; the layer is the last coordinate. (For storage cubes, face and layer are one: 6 layer +
     /// face, the third coordinate; such an image is a `D2` array.)
     pub arrayed: bool,
-    /// Whether it has several samples.
+    /// True if it has several samples.
     pub multisampled: bool,
 }
 
 impl ImageShape {
-    /// How many coordinates address a texel, with the layer.
+    /// The number of coordinates that address a texel, with the layer.
     pub fn coordinates(self) -> usize {
         self.dimension.coordinates() + usize::from(self.arrayed)
     }
 }
 
-/// How a sample's level of detail is chosen.
+/// The source of a sample's level of detail.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Lod {
-    /// From the coordinates' differences within the quad, plus a bias.
+    /// Computed from the coordinates' differences within the quad, plus a bias.
     Implicit {
         /// Added to the level.
         bias: Option<Reg>,
         /// The level is at least this.
         minimum: Option<Reg>,
     },
-    /// Given.
+    /// The level itself.
     Explicit(Reg),
-    /// From given gradients, one register for each coordinate without the layer.
+    /// Computed from given gradients, one register for each coordinate without the layer.
     Gradient {
         /// Along x.
         dx: Vec<Reg>,
@@ -74,7 +74,7 @@ pub enum Lod {
 /// A filtered access through a sampler.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sample {
-    /// Red, green, blue, alpha; None where nobody asks. For a depth comparison only the first.
+    /// Red, green, blue, alpha; None for a component that is not used. A depth comparison has only the first.
     pub dst: [Option<Reg>; 4],
     /// The image.
     pub image: Binding,
@@ -90,14 +90,14 @@ pub struct Sample {
     pub offset: Vec<Reg>,
     /// Reference value of a depth comparison.
     pub compare: Option<Reg>,
-    /// Gather this component of the four texels that bilinear filtering would use, instead of filtering.
+    /// The component to gather from the four texels that bilinear filtering would use. None to filter.
     pub gather: Option<u8>,
 }
 
 /// An access to one texel by integer coordinates, unfiltered (a fetch from a sampled image or a read of a storage image).
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImageRead {
-    /// Red, green, blue, alpha; None where nobody asks.
+    /// Red, green, blue, alpha; None for a component that is not used.
     pub dst: [Option<Reg>; 4],
     /// The image.
     pub image: Binding,
@@ -129,9 +129,9 @@ pub struct ImageWrite {
 /// An atomic operation on a texel of one 32-bit component.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImageAtomic {
-    /// The old value, if anybody asks.
+    /// The old value; None if it is not used.
     pub dst: Option<Reg>,
-    /// What to do.
+    /// The operation.
     pub op: AtomicOp,
     /// The image.
     pub image: Binding,
@@ -143,14 +143,14 @@ pub struct ImageAtomic {
     pub sample: Option<Reg>,
     /// The operand.
     pub value: Reg,
-    /// What [`AtomicOp::CompareExchange`] compares with.
+    /// The value that [`AtomicOp::CompareExchange`] compares with.
     pub comparator: Option<Reg>,
 }
 
-/// A question about an image.
+/// A query about an image.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ImageQuery {
-    /// Width, height, depth (as far as they exist), then layers, of a mip level (default 0).
+    /// Width, height, depth (as many as the dimension has), then layers, of a mip level (default 0).
     Size {
         /// The level.
         level: Option<Reg>,

@@ -9,10 +9,10 @@ use super::register::{Reg, Type};
 pub struct Binding {
     /// The first bind point.
     pub slot: u32,
-    /// The length of the array; 1 if it is none.
+    /// The length of the array; 1 for a single descriptor.
     pub count: u32,
-    /// The index into the array, if it has to be computed. It may differ from lane to lane. An index out of range
-    /// behaves as a buffer of size zero.
+    /// The index into the array, if it is computed. It may differ between lanes. An index out of range gives a buffer
+    /// of size zero.
     pub index: Option<Reg>,
 }
 
@@ -27,29 +27,29 @@ impl Binding {
     }
 }
 
-/// A memory that addresses are relative to.
+/// The memory that an address is relative to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Space {
     /// A bound buffer range.
     Buffer(Binding),
     /// Push constants: read-only.
     PushConstants,
-    /// Workgroup memory: of the batch.
+    /// Workgroup memory: one for the batch.
     Shared,
-    /// Private memory: of the lane. 32- and 64-bit accesses only; addresses are multiples of 4.
+    /// Private memory: one for each lane. 32- and 64-bit accesses only; addresses are multiples of 4.
     Private,
     /// Device addresses of 64 bits.
     Global,
 }
 
-/// Where an access goes: `base + offset` bytes into a space. The sum doesn't wrap: what overflows is out of range.
+/// The address of an access: `base + offset` bytes into a space. The sum doesn't wrap: an overflow is out of range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Address {
     /// The memory.
     pub space: Space,
     /// Byte address: `B32`, or `B64` for [`Space::Global`], where it must be given. None is zero.
     pub base: Option<Reg>,
-    /// Bytes beyond it.
+    /// Bytes added to `base`.
     pub offset: u32,
 }
 
@@ -72,7 +72,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// Its size in memory.
+    /// The element's size in memory.
     pub fn bytes(self) -> u32 {
         match self {
             Self::U8 | Self::S8 => 1,
@@ -82,7 +82,7 @@ impl Format {
         }
     }
 
-    /// The type of the register that holds it.
+    /// The type of the register that holds an element.
     pub fn register_type(self) -> Type {
         if self == Self::B64 {
             Type::B64

@@ -2,7 +2,7 @@
 
 use super::register::Type;
 
-/// What an instruction costs on the shader cores: the granularity of the counters that the timing model reads.
+/// The cost class of an instruction on the shader cores. The timing model reads counters by kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum Kind {
@@ -29,7 +29,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// How many kinds there are.
+    /// The number of kinds.
     pub const COUNT: usize = 10;
     /// All kinds, in order of their discriminants.
     pub const ALL: [Self; Self::COUNT] = [
@@ -88,7 +88,7 @@ macro_rules! operations {
                 }
             }
 
-            /// What it costs.
+            /// The kind of instruction that it is, which tells its cost.
             pub fn kind(self) -> Kind {
                 match self { $(Self::$op => Kind::$kind,)* }
             }
@@ -259,9 +259,9 @@ operations! {
     FLe(w w) -> b, Float;
     /// Ordered `a != b`: false if either is NaN.
     FLtGt(w w) -> b, Float;
-    /// Whether it is NaN.
+    /// True if `a` is NaN.
     FIsNan(w) -> b, Float;
-    /// Whether it is an infinity.
+    /// True if `a` is an infinity.
     FIsInf(w) -> b, Float;
 
     // Transcendental functions, 32-bit floats, FExp to FAtanh. Errors are stated and tested in `kernels::elementary`.
@@ -409,9 +409,9 @@ operations! {
     FLe64(d d) -> b, Wide;
     /// Ordered `a != b`: false if either is NaN.
     FLtGt64(d d) -> b, Wide;
-    /// Whether it is NaN.
+    /// True if `a` is NaN.
     FIsNan64(d) -> b, Wide;
-    /// Whether it is an infinity.
+    /// True if `a` is an infinity.
     FIsInf64(d) -> b, Wide;
     /// `a * 2^b`, `b` a signed 32-bit integer.
     FLdexp64(d w) -> d, Wide;

@@ -1,4 +1,4 @@
-//! A program: its registers, what it is given and gives, its statements, and the limits of all of them.
+//! A program: its registers, inputs, outputs, statements, and their limits.
 
 use std::fmt::{Display, Formatter, Result};
 
@@ -17,7 +17,7 @@ pub const MAX_SUBGROUP_SIZE: usize = 128;
 /// The most constructs that may be nested.
 pub const MAX_NESTING: usize = 256;
 
-/// Whether an input is the same in all lanes of a batch.
+/// The rate of an input: one value for a batch or one for each lane.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Rate {
     /// One value for the whole batch (for example a workgroup's id).
@@ -29,8 +29,7 @@ pub enum Rate {
 /// A register that the caller fills before each batch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Input {
-    /// The number by which the caller knows it. What the numbers mean is between the caller and whoever builds the
-    /// program.
+    /// The number by which the caller knows it. The IR gives it no meaning.
     pub slot: u32,
     /// The value that holds it.
     pub reg: Reg,
@@ -61,7 +60,7 @@ pub struct Constant {
 pub struct Program {
     /// All registers; [`Reg`] is an index into it.
     pub registers: Vec<Register>,
-    /// Values known beforehand.
+    /// Values known before the program runs.
     pub constants: Vec<Constant>,
     /// Values that the caller gives.
     pub inputs: Vec<Input>,
@@ -69,8 +68,8 @@ pub struct Program {
     pub outputs: Vec<Output>,
     /// Bytes of workgroup memory, at most [`MAX_MEMORY_BYTES`]. It is zero when a batch begins.
     pub shared_bytes: u32,
-    /// Bytes of private memory of each lane, a multiple of 4, at most [`MAX_MEMORY_BYTES`]. What it holds when a batch
-    /// begins is not defined.
+    /// Bytes of private memory of each lane, a multiple of 4, at most [`MAX_MEMORY_BYTES`]. Its contents are undefined
+    /// when a batch begins.
     pub private_bytes: u32,
     /// The statements.
     pub body: Block,

@@ -9,7 +9,7 @@ pub const VECTOR_LANES: usize = 16;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Reg(pub u32);
 
-/// How wide a register is.
+/// The type of a register, which is its width.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Type {
     /// A truth value.
@@ -20,7 +20,7 @@ pub enum Type {
     B64,
 }
 
-/// How a register is written.
+/// The role of a register: defined once, or assigned any number of times.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Role {
     /// Defined once, in all lanes.
@@ -34,7 +34,7 @@ pub enum Role {
 pub struct Register {
     /// Its type.
     pub ty: Type,
-    /// How it is written.
+    /// Its role.
     pub role: Role,
 }
 

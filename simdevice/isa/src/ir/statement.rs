@@ -1,4 +1,4 @@
-//! Statements: what each does, which registers it defines and uses, and its text.
+//! Statements: their effects, the registers that they define and use, and their text.
 
 use std::fmt::{Display, Formatter, Result};
 
@@ -17,13 +17,13 @@ pub struct Label(pub u32);
 /// A case of a switch.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Case {
-    /// The selector's values that lead here, each in only one case.
+    /// The selector's values that select this case. A value belongs to only one case.
     pub values: Vec<u32>,
-    /// Whether this case is also where all other values lead. At most one case of a switch.
+    /// True if all values without a case select this one. At most one case of a switch is the default.
     pub default: bool,
-    /// What it does.
+    /// Its statements.
     pub body: Block,
-    /// Whether lanes at the end of the body go on in the next case rather than leave the switch.
+    /// True if lanes at the end of the body go on in the next case; otherwise they leave the switch.
     pub fallthrough: bool,
 }
 
@@ -39,13 +39,13 @@ pub enum Axis {
 /// An operation across the active lanes of a subgroup (or of a quad).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum SubgroupOp {
-    /// Whether this is the first active lane. No operand; `Bool`.
+    /// True in the first active lane. No operand; `Bool`.
     Elect,
-    /// Whether all active lanes have true. `Bool` to `Bool`.
+    /// True if all active lanes have true. `Bool` to `Bool`.
     All,
-    /// Whether any active lane has true. `Bool` to `Bool`.
+    /// True if any active lane has true. `Bool` to `Bool`.
     Any,
-    /// Whether the active lanes' values are equal bits. Any type to `Bool`.
+    /// True if the active lanes' values have equal bits. Any type to `Bool`.
     AllEqual,
     /// A bit for each active lane with true, lane 0 lowest. `Bool` to four `B32`.
     Ballot,
@@ -63,8 +63,8 @@ pub enum SubgroupOp {
     QuadBroadcast,
     /// The value of lane `own ^ (index & 3)` of the quad, active or not: 1 horizontal, 2 vertical, 3 diagonal.
     QuadSwap,
-    /// Combination over the active lanes of each run of `cluster` lanes (a power of two; the subgroup size or more for
-    /// all).
+    /// Combination over the active lanes of each run of `cluster` lanes (a power of two; a run of the subgroup size or
+    /// more is the whole subgroup).
     Reduce {
         /// An associative operation: see [`is_reducible`].
         op: Op,
@@ -118,7 +118,7 @@ pub fn is_reducible(op: Op) -> bool {
 pub enum Statement {
     /// `dst = op(src...)`, in all lanes.
     Compute {
-        /// What to do.
+        /// The operation.
         op: Op,
         /// The value defined.
         dst: Reg,
@@ -129,7 +129,7 @@ pub enum Statement {
     Assign {
         /// The variable.
         dst: Reg,
-        /// What it becomes.
+        /// Its new value.
         src: Reg,
     },
     /// The lane's index in the batch, `B32`. Its remainder by the subgroup size is the subgroup invocation.
@@ -137,44 +137,44 @@ pub enum Statement {
         /// The value defined.
         dst: Reg,
     },
-    /// Whether the lane is a helper, `Bool`.
+    /// True if the lane is a helper; `Bool`.
     IsHelper {
         /// The value defined.
         dst: Reg,
     },
-    /// Loads consecutive elements. Out of range reads zero.
+    /// Loads consecutive elements. An element that is out of range is zero.
     Load {
         /// The values defined, 1 to 16.
         dst: Vec<Reg>,
-        /// Where the first is.
+        /// The address of the first element.
         address: Address,
-        /// What each is.
+        /// The format of each element.
         format: Format,
     },
-    /// Stores consecutive elements, in active lanes that aren't helpers. Out of range vanishes, element by element.
-    /// Where lanes collide, one of them wins.
+    /// Stores consecutive elements, in active lanes that aren't helpers. An element that is out of range is not stored.
+    /// If lanes store to the same place, one of them wins.
     Store {
         /// The elements, 1 to 16.
         src: Vec<Reg>,
-        /// Where the first goes.
+        /// The address of the first element.
         address: Address,
-        /// What each is.
+        /// The format of each element.
         format: Format,
     },
-    /// A read-modify-write, in active lanes that aren't helpers, in order of lanes. Not for private memory or push
-    /// constants. Out of range reads zero and does nothing.
+    /// A read-modify-write, in active lanes that aren't helpers, in order of lanes. Private memory and push constants
+    /// have none. One that is out of range gives zero and changes nothing.
     Atomic {
-        /// What to do.
+        /// The operation.
         op: AtomicOp,
-        /// The old value, if anybody asks.
+        /// The old value; None if it is not used.
         dst: Option<Reg>,
-        /// Where.
+        /// The address of the element.
         address: Address,
         /// `B32` or `B64`.
         format: Format,
         /// The operand.
         value: Reg,
-        /// What [`AtomicOp::CompareExchange`] compares with.
+        /// The value that [`AtomicOp::CompareExchange`] compares with.
         comparator: Option<Reg>,
     },
     /// The size in bytes of a bound buffer range, `B32`.
@@ -192,15 +192,15 @@ pub enum Statement {
     ImageWrite(Box<ImageWrite>),
     /// Image atomic, in active lanes that aren't helpers.
     ImageAtomic(Box<ImageAtomic>),
-    /// A question about an image.
+    /// A query about an image.
     ImageQuery {
-        /// The answers, `B32`; as many as asked for.
+        /// The results, `B32`; as many as the query gives.
         dst: Vec<Reg>,
         /// The image.
         image: Binding,
         /// The image's kind.
         shape: ImageShape,
-        /// What is asked.
+        /// The query.
         query: ImageQuery,
     },
     /// A derivative: the difference within the 2x2 quad (lanes 4q.. are upper left, upper right, lower left, lower
@@ -208,16 +208,16 @@ pub enum Statement {
     Derivative {
         /// The value defined.
         dst: Reg,
-        /// What is differentiated.
+        /// The value to differentiate.
         src: Reg,
-        /// Along which axis.
+        /// The axis.
         axis: Axis,
-        /// Of the lane's own row or column; otherwise one for the quad.
+        /// True for the difference of the lane's own row or column; false for one difference of the quad.
         fine: bool,
     },
     /// An operation across lanes.
     Subgroup {
-        /// What to do.
+        /// The operation.
         op: SubgroupOp,
         /// The value defined; four for a ballot.
         dst: Vec<Reg>,
@@ -226,33 +226,34 @@ pub enum Statement {
         /// The lane operand of shuffles and quad operations.
         index: Option<Reg>,
     },
-    /// All lanes reach this before any goes on. In this machine that is always so; it keeps memory accesses in order.
+    /// A barrier: all lanes reach it before any goes on. The machine runs lanes in step, so it only orders memory
+    /// accesses.
     Barrier,
-    /// Branches.
+    /// A branch.
     If {
         /// `Bool`.
         condition: Reg,
-        /// Lanes with true.
+        /// Statements for the lanes with true.
         then: Block,
-        /// Lanes with false.
+        /// Statements for the lanes with false.
         otherwise: Block,
     },
-    /// Multi-way branch. A lane whose selector has no case, and where there's no default, leaves the switch.
+    /// A multi-way branch. A lane whose selector has no case leaves the switch if there is no default.
     Switch {
         /// `Break` to it leaves the switch.
         label: Label,
         /// `B32`.
         selector: Reg,
-        /// In order.
+        /// The cases, in order.
         cases: Vec<Case>,
     },
     /// Repeats `body` then `continuing` until every lane has left by a break.
     Loop {
         /// `Break` to it leaves the loop; `Continue` goes to `continuing`.
         label: Label,
-        /// What is repeated.
+        /// The repeated statements.
         body: Block,
-        /// What a lane does between a `Continue`, or the body's end, and the next iteration.
+        /// The statements between a `Continue`, or the body's end, and the next iteration.
         continuing: Block,
     },
     /// Statements that `Break` may leave early (an inlined function, for example).
@@ -268,7 +269,7 @@ pub enum Statement {
     Continue(Label),
     /// The active lanes are done.
     Return,
-    /// The active lanes are done and marked as killed: nothing of them shall be written.
+    /// The active lanes are done and marked as killed: none of their results may be written.
     Kill,
     /// The active lanes become helpers and are marked as killed, but go on.
     Demote,

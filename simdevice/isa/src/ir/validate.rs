@@ -1,4 +1,4 @@
-//! Checks a program before anything trusts it, so that running one can neither panic nor reach out of range.
+//! Checks programs. A program that passes can neither panic nor reach out of range when it runs.
 
 use std::collections::HashSet;
 
@@ -15,13 +15,13 @@ const MAX_REGISTERS: usize = 1 << 22;
 /// The most elements of one load or store.
 const MAX_ELEMENTS: usize = 16;
 
-/// Why a program can't run.
+/// The reason that a program can't run.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum InvalidProgram {
     /// The tree of constructs is wrong.
     #[error("{problem}")]
     Structure {
-        /// What is wrong.
+        /// The problem.
         problem: &'static str,
     },
     /// One register is wrong.
@@ -29,7 +29,7 @@ pub enum InvalidProgram {
     Register {
         /// Its index.
         register: u32,
-        /// What is wrong with it.
+        /// The problem.
         problem: &'static str,
     },
     /// One statement is wrong.
@@ -37,7 +37,7 @@ pub enum InvalidProgram {
     Statement {
         /// The statement, disassembled.
         statement: String,
-        /// What is wrong with it.
+        /// The problem.
         problem: String,
     },
 }
@@ -101,7 +101,7 @@ fn wrong<T>(reg: Reg, problem: &'static str) -> Result<T, InvalidProgram> {
 /// A construct that may be left.
 struct Open {
     label: Label,
-    /// Whether `Continue` is allowed here: in a loop's body.
+    /// True where `Continue` is allowed: in a loop's body.
     continues: bool,
 }
 
@@ -509,7 +509,7 @@ impl Checker<'_> {
     }
 }
 
-/// What is wrong with a statement's operands.
+/// A problem with a statement's operands.
 enum Problem {
     Here(String),
     Register(InvalidProgram),

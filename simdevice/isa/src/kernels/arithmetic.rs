@@ -1,7 +1,7 @@
 //! Arithmetic: one kernel, a function of its own, for each operation.
 //!
-//! 32-bit operations that vectors have are written with vectors of 16 lanes; the rest lane by lane, which the compiler
-//! vectorises where it can. A step holds which kernel it runs, so that decoding it is one indirect call.
+//! 32-bit operations that SIMD vectors have are written with vectors of 16 lanes; the rest lane by lane, which the Rust
+//! compiler vectorises where it can. A step holds a pointer to its kernel, so that decoding it is one indirect call.
 
 use std::cmp::Ordering;
 
@@ -18,7 +18,7 @@ type U<S> = u32x16<S>;
 type I<S> = i32x16<S>;
 type F<S> = f32x16<S>;
 
-// The shapes of operation: what the operands are read as, and what the result is.
+// The shapes of operations: the types of the operands and of the result.
 macro_rules! word {
     (@ $shape:ident, |$($a:ident),+| $value:expr) => {
         |simd, file, dst, src| {
@@ -66,7 +66,7 @@ macro_rules! signed {
         })
     };
 }
-/// Lane by lane.
+/// Defines a kernel that runs lane by lane.
 macro_rules! lanes {
     ($map:ident, $f:expr $(,)?) => {
         |simd, file, dst, src| {
@@ -77,8 +77,8 @@ macro_rules! lanes {
         }
     };
 }
-/// `a` where it is `chosen` and `b` elsewhere, but where one of both is not a number, the other: also where it is a signalling
-/// one, which AVX-512's own minimum and maximum make quiet and return.
+/// `a` where it is `chosen` and `b` elsewhere. Where one of the two is NaN, the other one. That holds for a signalling
+/// NaN too, which AVX-512's minimum and maximum would make quiet and return.
 #[inline(always)]
 fn number_or_other<S: Simd>(chosen: mask32x16<S>, a: F<S>, b: F<S>) -> F<S> {
     b.simd_eq(b).select(chosen.select(a, b), a)
@@ -159,7 +159,7 @@ fn less_common<S: Simd>(op: Op) -> Kernel<S> {
     }
 }
 
-/// 32-bit operations that vectors don't have.
+/// The kernel of a 32-bit operation that SIMD vectors don't have.
 fn by_lane<S: Simd>(op: Op) -> Kernel<S> {
     match op {
         Op::UDiv => lanes!(map2, |a: u32, b: u32| {

@@ -1,9 +1,9 @@
 //! Elementary functions of 32-bit floats, 16 lanes at a time.
 //!
-//! Arguments are reduced as usual and the rest is a short polynomial, with coefficients as in the Cephes library. The
-//! largest errors against `f64`, which the tests check by dense sampling, are a few units in the last place, where the
-//! Vulkan specification asks for 3 + 2|x| ULP (exp), 3 ULP (log), 2^-11 absolute (sin, cos) and 4096 ULP (inverse
-//! trigonometric functions).
+//! Arguments are reduced to a small range, in which a short polynomial with the coefficients of the Cephes library is
+//! evaluated. The largest errors against `f64`, which the tests check by dense sampling, are a few units in the last
+//! place. The Vulkan specification allows 3 + 2|x| ULP (exp), 3 ULP (log), 2^-11 absolute (sin, cos) and 4096 ULP
+//! (inverse trigonometric functions).
 
 use fearless_simd::{Simd, f32x16, i32x16, mask32x16, prelude::*, u32x16};
 use std::f32::consts::{FRAC_2_PI, FRAC_PI_2, FRAC_PI_4, LN_2, LOG2_E, PI, SQRT_2};
@@ -16,12 +16,12 @@ type I<S> = i32x16<S>;
 type U<S> = u32x16<S>;
 type M<S> = mask32x16<S>;
 
-/// Reports whether an operation is one of these functions.
+/// Reports whether an operation is an elementary function.
 pub fn is_one(op: Op) -> bool {
     (Op::FExp as u8..=Op::FAtanh as u8).contains(&(op as u8))
 }
 
-/// The kernel of one of these functions.
+/// The kernel of an elementary function.
 pub fn kernel<S: Simd>(op: Op) -> Kernel<S> {
     macro_rules! unary {
         ($function:ident) => {
@@ -182,7 +182,7 @@ fn logarithm<S: Simd>(x: F<S>) -> Logarithm<S> {
     let denormal = x.simd_lt(splat(x, f32::MIN_POSITIVE));
     let normal = denormal.select(x * 16_777_216.0, x);
     let bits = normal.bitcast::<I<S>>();
-    // Subtracting the bits of sqrt(1/2) moves the step between exponents there.
+    // Subtracting the bits of sqrt(1/2) makes the exponent change there.
     let shifted = bits - 0x3f35_04f3;
     let exponent = F::float_from(shifted >> 23) - denormal.select(splat(x, 24.0), splat(x, 0.0));
     let mantissa = ((shifted & 0x007f_ffff) + 0x3f35_04f3).bitcast::<F<S>>();
@@ -238,7 +238,7 @@ fn log2<S: Simd>(x: F<S>) -> F<S> {
         fraction,
         polynomial,
     } = logarithm(x);
-    // log2(e) - 1, so that the larger part is exact.
+    // log2(e) - 1: splitting off 1 keeps the larger part exact.
     let excess = splat(x, LOG2_E - 1.0);
     let low = (polynomial * excess) + fraction * excess;
     let y = low + polynomial + fraction + exponent;
@@ -251,7 +251,7 @@ fn pow<S: Simd>(x: F<S>, y: F<S>) -> F<S> {
     y.simd_eq(splat(x, 0.0)).select(splat(x, 1.0), result)
 }
 
-/// The angle within a quarter turn, from -pi/4 to pi/4, and the number of quarter turns before it.
+/// The angle reduced to -pi/4 to pi/4, and the number of quarter turns that were removed.
 #[inline(always)]
 fn reduce<S: Simd>(x: F<S>) -> (F<S>, I<S>) {
     let n = (x * FRAC_2_PI).round_ties_even();
@@ -264,7 +264,7 @@ fn reduce<S: Simd>(x: F<S>) -> (F<S>, I<S>) {
 /// Above this the reduction loses accuracy.
 const LARGEST_ANGLE: f32 = 8192.0;
 
-/// `y`, except where `x` is too large for [`reduce`]: there, `exact` of it.
+/// `y`, except where `x` is too large for [`reduce`]: there, `exact` of `x`.
 #[inline(always)]
 fn or_exact<S: Simd>(x: F<S>, y: F<S>, exact: fn(f64) -> f64) -> F<S> {
     let small = x.abs().simd_le(splat(x, LARGEST_ANGLE));
@@ -286,7 +286,7 @@ fn cosine_polynomial<S: Simd>(z: F<S>) -> F<S> {
     (p * z).mul_add(z, z * -0.5) + 1.0
 }
 
-/// Sine of the angle `quarters` quarter turns beyond `x`.
+/// The sine of `x` plus `quarters` quarter turns.
 #[inline(always)]
 fn sine_after<S: Simd>(x: F<S>, quarters: i32) -> F<S> {
     let (r, n) = reduce(x);
@@ -406,7 +406,7 @@ fn atan2<S: Simd>(y: F<S>, x: F<S>) -> F<S> {
     let (small, large) = (steep.select(ax, ay), steep.select(ay, ax));
     let equal = small.simd_eq(large);
     let zero = large.simd_eq(splat(x, 0.0));
-    // 0/0 and infinity/infinity have their angles too.
+    // 0/0 and infinity/infinity have an angle, too.
     let ratio = equal.select(zero.select(splat(x, 0.0), splat(x, 1.0)), small / large);
     let angle = atan_positive(ratio);
     let angle = steep.select(splat(x, FRAC_PI_2) - angle, angle);

@@ -1,4 +1,4 @@
-//! Kernels: what each operation does to registers, compiled for every SIMD level.
+//! Kernels: the functions that compute operations on registers, compiled for every SIMD level.
 
 pub mod arithmetic;
 mod elementary;
@@ -13,7 +13,7 @@ use crate::ir::op::Op;
 use crate::ir::{AtomicOp, Format, Type};
 use registers::{RegisterFile, RegisterSlot, Vector};
 
-/// The result of an operation on constants, by the same kernels that programs run.
+/// The result of an operation on constants, computed with the kernels that programs run.
 pub fn evaluate(level: Level, op: Op, operands: &[u64]) -> u64 {
     let signature = op.signature();
     let place = |index: usize| RegisterSlot::uniform(2 * index);

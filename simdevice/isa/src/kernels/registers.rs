@@ -12,14 +12,15 @@ use crate::ir::{Type, VECTOR_LANES};
 #[repr(C, align(64))]
 pub struct Vector(pub [u32; VECTOR_LANES]);
 
-/// Where a register lives: its first vector, and whether it has one for each 16 lanes or one for all.
+/// The place of a register in the register file: its first vector, and whether it has one for each 16 lanes or one for
+/// all.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RegisterSlot(u32);
 
 impl RegisterSlot {
     const VARYING: u32 = 1 << 31;
 
-    /// The register that is always zero; it stands for operands that aren't there.
+    /// The register that is always zero; it stands for absent operands.
     pub const ZERO: Self = Self(0);
 
     /// A register with one value for the whole batch.
@@ -53,8 +54,8 @@ pub struct RegisterFile<'a> {
     span: Span,
 }
 
-/// Vectors from the first to the last that has active lanes. The others are skipped: nobody looks at what an instruction
-/// gives in lanes that are not active, except within their own vector.
+/// A range of vectors, from the first to the last that has active lanes. The others are skipped: the result of an
+/// instruction in an inactive lane is read only within its own vector.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Span {
     pub first: usize,
@@ -74,7 +75,7 @@ impl<'a> RegisterFile<'a> {
         }
     }
 
-    /// The same registers, of which other vectors shall be computed.
+    /// The same register file, with another span of vectors to compute.
     #[inline(always)]
     pub fn with_span(self, span: Span) -> Self {
         Self { span, ..self }
@@ -86,7 +87,7 @@ impl<'a> RegisterFile<'a> {
         self.span.first..self.span.first + self.span.count
     }
 
-    /// The vectors of a 32-bit register that are to be computed: the span's, or the only one.
+    /// The vectors of a 32-bit register to compute: the span's, or the only one if it is uniform.
     #[inline(always)]
     fn spanned(self, slot: RegisterSlot) -> &'a [Cell<Vector>] {
         if slot.is_varying() {
@@ -96,7 +97,7 @@ impl<'a> RegisterFile<'a> {
         }
     }
 
-    /// The vectors to be computed of a register: the span, or the first if it is uniform.
+    /// The indices of a register's vectors to compute: the span's, or only the first if it is uniform.
     #[inline(always)]
     pub fn rounds(self, dst: RegisterSlot) -> Range<usize> {
         if dst.is_varying() { self.span() } else { 0..1 }
@@ -122,7 +123,7 @@ impl<'a> RegisterFile<'a> {
         &self.vectors[slot.start()..][..count]
     }
 
-    /// The lanes of a register for 16 lanes of the batch.
+    /// Returns a register's value in the 16 lanes of a vector of the batch.
     #[inline(always)]
     pub fn lanes<T: Lane>(self, slot: RegisterSlot, index: usize) -> [T; VECTOR_LANES] {
         let vectors = T::vectors(self, slot);
@@ -135,7 +136,7 @@ impl<'a> RegisterFile<'a> {
         T::load(T::vectors(self, slot), 0)[0]
     }
 
-    /// Sets a register for 16 lanes of the batch.
+    /// Sets a register in the 16 lanes of a vector of the batch.
     #[inline(always)]
     pub fn set<T: Lane>(self, slot: RegisterSlot, index: usize, value: [T; VECTOR_LANES]) {
         T::store(
@@ -155,16 +156,16 @@ impl<'a> RegisterFile<'a> {
     }
 }
 
-/// `dst = op(src...)` in the lanes that a file spans.
+/// A function that computes `dst = op(src...)` in the vectors that the register file spans.
 pub type Kernel<S> = fn(S, &RegisterFile<'_>, RegisterSlot, &[RegisterSlot; 4]);
 
 /// A type that a register's lanes may be read as.
 pub trait Lane: Copy + Default {
     /// The vectors of a register of this type's width.
     fn vectors<'a>(file: RegisterFile<'a>, slot: RegisterSlot) -> &'a [Cell<Vector>];
-    /// Lanes 16 `index`..
+    /// Loads the 16 lanes from lane 16 `index` on.
     fn load(vectors: &[Cell<Vector>], index: usize) -> [Self; VECTOR_LANES];
-    /// Sets lanes 16 `index`..
+    /// Stores the 16 lanes from lane 16 `index` on.
     fn store(vectors: &[Cell<Vector>], index: usize, value: [Self; VECTOR_LANES]);
 }
 
@@ -244,7 +245,7 @@ wide_lane!(i64, |bits: u64| bits.cast_signed(), |value: i64| value
     .cast_unsigned());
 wide_lane!(f64, f64::from_bits, f64::to_bits);
 
-/// Lane by lane, one operand.
+/// Applies a function of one operand lane by lane.
 #[inline(always)]
 pub fn map1<A: Lane, R: Lane>(
     file: RegisterFile<'_>,
@@ -257,7 +258,7 @@ pub fn map1<A: Lane, R: Lane>(
     }
 }
 
-/// Lane by lane, two operands.
+/// Applies a function of two operands lane by lane.
 #[inline(always)]
 pub fn map2<A: Lane, B: Lane, R: Lane>(
     file: RegisterFile<'_>,
@@ -275,7 +276,7 @@ pub fn map2<A: Lane, B: Lane, R: Lane>(
     }
 }
 
-/// Lane by lane, three operands.
+/// Applies a function of three operands lane by lane.
 #[inline(always)]
 pub fn map3<A: Lane, B: Lane, C: Lane, R: Lane>(
     file: RegisterFile<'_>,
@@ -325,7 +326,7 @@ pub fn from_mask<S: Simd>(mask: mask32x16<S>) -> u32x16<S> {
 // The loops below are over indices, because the standard library's adapters are not always inlined into functions of
 // another SIMD level.
 
-/// `value` to all vectors.
+/// Stores `value` to all vectors.
 #[inline(always)]
 fn fill<S: Simd>(dst: &[Cell<Vector>], value: u32x16<S>) {
     for vector in dst {
@@ -333,7 +334,7 @@ fn fill<S: Simd>(dst: &[Cell<Vector>], value: u32x16<S>) {
     }
 }
 
-/// Vector by vector, one operand.
+/// Applies a function of one operand vector by vector.
 #[inline(always)]
 pub fn vector1<S: Simd>(
     simd: S,
@@ -353,7 +354,7 @@ pub fn vector1<S: Simd>(
     }
 }
 
-/// Vector by vector, two operands.
+/// Applies a function of two operands vector by vector.
 #[inline(always)]
 pub fn vector2<S: Simd>(
     simd: S,
@@ -387,7 +388,7 @@ pub fn vector2<S: Simd>(
     }
 }
 
-/// Vector by vector, three operands. Only the commonest case has a loop without checks.
+/// Applies a function of three operands vector by vector. Only the commonest case has a loop without bounds checks.
 #[inline(always)]
 pub fn vector3<S: Simd>(
     simd: S,
@@ -407,7 +408,7 @@ pub fn vector3<S: Simd>(
         }
         return;
     }
-    // A uniform operand has one vector for all rounds.
+    // A uniform operand has one vector for all iterations.
     let step = |operand: &[Cell<Vector>]| if operand.len() == n { usize::MAX } else { 0 };
     let (at_a, at_b, at_c) = (step(a), step(b), step(c));
     for i in 0..n {

@@ -1,4 +1,4 @@
-//! A batch while it runs: what every step may reach.
+//! The state of a batch while it runs.
 
 use std::cell::Cell;
 use std::sync::atomic::AtomicU32;
@@ -12,7 +12,7 @@ use crate::ir::{Reg, Type};
 use crate::kernels::registers::{RegisterFile, RegisterSlot, Vector, load_vector, store_vector};
 use crate::resources::Resources;
 
-/// What a batch's steps work on.
+/// The state that a batch's steps work on.
 #[derive(Clone, Copy)]
 pub struct Batch<'a> {
     pub program: &'a CompiledProgram,
@@ -21,20 +21,20 @@ pub struct Batch<'a> {
     pub masks: Masks<'a>,
     /// Workgroup memory.
     pub shared: &'a [AtomicU32],
-    /// Whether all lanes that the batch began with are active, of those in the vectors that the file spans.
+    /// True if all lanes that the batch began with are active in the vectors that the file spans.
     pub whole: bool,
     /// Private memory: a row of vectors for each word.
     pub private: &'a [Cell<Vector>],
 }
 
 impl Batch<'_> {
-    /// Where a register lives.
+    /// The place of a register in the register file.
     #[inline(always)]
     pub fn slot(&self, reg: Reg) -> RegisterSlot {
         self.program.slots[reg.0 as usize]
     }
 
-    /// Takes the span of the vectors that have active lanes, after the masks have changed.
+    /// Recomputes the span of vectors that have active lanes, after the masks have changed.
     #[inline(always)]
     pub fn refresh_span(&mut self) {
         let (span, whole) = self.masks.span();
@@ -90,7 +90,7 @@ impl Batch<'_> {
         }
     }
 
-    /// Copies the vectors to compute of a register; a uniform source has only the first `per_16`.
+    /// Copies the vectors of a register that are computed; a uniform source has only the first `per_16`.
     #[inline(always)]
     fn copy_vectors(
         &self,

@@ -14,7 +14,7 @@ pub struct Work {
     pub uniform_instructions: [u64; Kind::COUNT],
     /// Lanes active over the instructions that work on each lane.
     pub active_lanes: u64,
-    /// Lanes that could have been active over them: their batches' lanes.
+    /// Lanes that could have been active over those instructions: all lanes of their batches.
     pub lanes: u64,
 }
 

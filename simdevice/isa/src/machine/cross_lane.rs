@@ -234,12 +234,12 @@ fn combine(op: Op, a: u64, b: u64) -> u64 {
         Op::FMul64 => (da * db).to_bits(),
         Op::FMin64 => da.min(db).to_bits(),
         Op::FMax64 => da.max(db).to_bits(),
-        // Validation admits no other.
+        // Validation allows no other operation.
         _ => a,
     }
 }
 
-/// What [`combine`] leaves unchanged.
+/// The identity element of [`combine`] for an operation.
 fn identity(op: Op) -> u64 {
     match op {
         Op::BAnd | Op::And | Op::UMin => u64::from(u32::MAX),

@@ -16,7 +16,7 @@ use crate::ir::op::Op;
 use crate::kernels::arithmetic::kernel;
 use crate::kernels::registers::{Kernel, RegisterFile, RegisterSlot};
 
-/// What runs a batch's steps; there is one implementation, compiled for each SIMD level.
+/// Runs a batch's steps. There is one implementation, compiled for each SIMD level.
 pub trait Engine: fmt::Debug + Send + Sync {
     /// Runs a batch whose active lanes are set. `runs` are the executions and active lanes of each counted run.
     fn run(
@@ -136,7 +136,7 @@ fn run_steps<S: Simd>(
     Ok(())
 }
 
-/// Updates the masks; returns where to go if not on.
+/// Updates the masks. Returns the step to jump to; None to go on with the next.
 #[inline(always)]
 fn branch<S: Simd>(simd: S, file: RegisterFile<'_>, masks: Masks<'_>, step: &Step) -> Option<u32> {
     let unless_any = |target: u32| (!masks.any(MaskId::ACTIVE)).then_some(target);
@@ -247,8 +247,8 @@ fn select_lanes(
     }
 }
 
-/// Runs a statement that reaches across lanes or out of the registers. It stands outside the loop over the steps, where
-/// its cases would take registers from the common steps.
+/// Runs a statement that reads other lanes or accesses memory. It is kept out of the loop over the steps, so that its
+/// cases don't take machine registers from the common steps.
 #[inline(never)]
 fn run_statement<S: Simd>(batch: &Batch<'_>, simd: S, statement: &Statement) {
     match statement {
@@ -317,7 +317,7 @@ fn run_statement<S: Simd>(batch: &Batch<'_>, simd: S, statement: &Statement) {
             src,
             index,
         } => cross_lane::subgroup(batch, *op, dst, *src, *index),
-        // The rest is arithmetic or control flow, which has steps of its own.
+        // All other statements are arithmetic or control flow, which have steps of their own.
         _ => {}
     }
 }

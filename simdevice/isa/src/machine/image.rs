@@ -1,4 +1,4 @@
-//! Image instructions: gathers operands for the image unit, which is asked once for each image among 16 lanes.
+//! Image instructions: gathers operands of 16 lanes and calls the image unit once for each image among them.
 
 use super::batch::Batch;
 use super::masks::lanes_of;
@@ -9,7 +9,7 @@ use crate::ir::{
 };
 use crate::resources::{LaneWords, LodRequest, SampleRequest, TexelRequest};
 
-/// A bind point that isn't bound to anything.
+/// The bind point that stands for none.
 const UNBOUND: u32 = u32::MAX;
 
 fn words(batch: &Batch<'_>, reg: Reg, vector: usize) -> LaneWords {
@@ -24,7 +24,7 @@ fn all_words<const N: usize>(batch: &Batch<'_>, regs: &[Reg], vector: usize) -> 
     std::array::from_fn(|index| words_or_zero(batch, regs.get(index).copied(), vector))
 }
 
-/// The bind points that 16 lanes mean.
+/// The bind points of 16 lanes.
 fn bind_points(batch: &Batch<'_>, binding: &Binding, vector: usize) -> LaneWords {
     let indices = words_or_zero(batch, binding.index, vector);
     indices.map(|index| {
@@ -79,7 +79,7 @@ fn lod_request(batch: &Batch<'_>, lod: &Lod, vector: usize) -> LodRequest {
 }
 
 pub fn sample(batch: &Batch<'_>, sample: &Sample) {
-    // What isn't an operand stays as it is here for all vectors.
+    // Fields that aren't operands keep these values for all vectors.
     let mut request = SampleRequest {
         mask: 0,
         shape: sample.shape,
@@ -118,7 +118,7 @@ pub fn sample(batch: &Batch<'_>, sample: &Sample) {
     }
 }
 
-/// Samples of 16 lanes that may mean different images or samplers.
+/// Samples for 16 lanes that may use different images or samplers.
 fn sample_each(
     batch: &Batch<'_>,
     sample: &Sample,
@@ -295,7 +295,7 @@ fn query_lod(
     answers
 }
 
-/// The bind point that all lanes mean, if no index tells.
+/// The bind point of all lanes, if the binding has no index.
 fn fixed_point(binding: &Binding) -> Option<u32> {
     (binding.index.is_none() && binding.count > 0).then_some(binding.slot)
 }
@@ -311,7 +311,7 @@ fn is_automatic(lod: &Lod) -> bool {
     )
 }
 
-/// Takes some lanes of what was found.
+/// Copies the found values of some lanes into the result.
 fn merge<const N: usize>(into: &mut [LaneWords; N], found: &[LaneWords; N], lanes: u16) {
     for (into, found) in into.iter_mut().zip(found) {
         lanes_of(lanes).for_each(|lane| into[lane] = found[lane]);

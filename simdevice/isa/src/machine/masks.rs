@@ -7,7 +7,7 @@ use fearless_simd::{Simd, prelude::*};
 use crate::compiler::step::MaskId;
 use crate::kernels::registers::{RegisterFile, RegisterSlot, Span, load_vector, to_mask};
 
-/// A set of lanes that the caller gives or gets.
+/// A set of lanes that the caller passes or receives.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LaneMask {
     words: Vec<u64>,
@@ -45,19 +45,19 @@ impl LaneMask {
         *word = if present { *word | bit } else { *word & !bit };
     }
 
-    /// The lanes by 64, lane 0 lowest; words beyond the end are zero.
+    /// The set's bits, 64 lanes to a word, lane 0 lowest; words beyond the end are zero.
     pub fn words(&self) -> &[u64] {
         &self.words
     }
 
-    /// The lanes by 64.
+    /// A set from its bits, 64 lanes to a word.
     pub(super) fn from_words(words: &[Cell<u64>]) -> Self {
         Self {
             words: words.iter().map(Cell::get).collect(),
         }
     }
 
-    /// How many lanes are in the set.
+    /// The number of lanes in the set.
     pub fn count(&self) -> usize {
         self.words
             .iter()
@@ -93,8 +93,8 @@ impl<'a> Masks<'a> {
         any != 0
     }
 
-    /// The vectors from the first to the last that has active lanes, and whether in them all lanes are active that were
-    /// when the batch began.
+    /// The vectors from the first to the last that has active lanes, and whether all lanes of these vectors that were
+    /// active when the batch began still are.
     #[inline(always)]
     pub fn span(self) -> (Span, bool) {
         let (active, entry) = (self.get(MaskId::ACTIVE), self.get(MaskId::ENTRY));
@@ -174,7 +174,7 @@ impl<'a> Masks<'a> {
         (self.get(mask)[vector / 4].get() >> (16 * (vector % 4))) as u16
     }
 
-    /// The active lanes among 16 whose writes count.
+    /// The active lanes among 16 that may write memory: those that aren't helpers.
     #[inline(always)]
     pub fn writing(self, vector: usize) -> u16 {
         self.bits(MaskId::ACTIVE, vector) & !self.bits(MaskId::HELPER, vector)
@@ -218,7 +218,7 @@ impl<'a> Masks<'a> {
     }
 }
 
-/// The lanes of a 16-lane set, ascending.
+/// The lanes of a set of 16, in ascending order.
 pub fn lanes_of(mut bits: u16) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
         let lane = bits.trailing_zeros() as usize;

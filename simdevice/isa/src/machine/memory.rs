@@ -1,4 +1,4 @@
-//! Loads, stores and atomics: every one bounds-checked by an index into a slice of atomic words.
+//! Loads, stores and atomics. Each is bounds-checked by an index into a slice of atomic words.
 
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
@@ -13,12 +13,12 @@ use crate::kernels::combine;
 use crate::kernels::registers::{RegisterSlot, each_lane, load_vector};
 use crate::resources::{load_word, range_words};
 
-/// Memory that an access goes to: words, and how many bytes of them count.
+/// The memory of an access: words, and the number of their bytes that may be accessed.
 #[derive(Clone, Copy)]
 struct View<'a> {
     words: &'a [AtomicU32],
     bytes: u32,
-    /// The range that it is, for atomics of 64 bits; workgroup memory has none, and only one thread.
+    /// The buffer range, for 64-bit atomics. Workgroup memory has none; only one thread accesses it.
     range: Option<&'a BufferRange>,
 }
 
@@ -38,7 +38,7 @@ impl<'a> View<'a> {
         }
     }
 
-    /// The element's bits, if it is aligned and within.
+    /// Returns the element's bits. None if it is misaligned or out of range.
     #[inline(always)]
     fn load(self, address: u64, format: Format) -> Option<u64> {
         let size = format.bytes();
@@ -62,7 +62,7 @@ impl<'a> View<'a> {
         })
     }
 
-    /// Stores an element, if it is aligned and within.
+    /// Stores an element. Does nothing if it is misaligned or out of range.
     #[inline(always)]
     fn store(self, address: u64, format: Format, value: u64) {
         let size = format.bytes();
@@ -87,14 +87,14 @@ impl<'a> View<'a> {
                 let shift = 8 * (address % 4) as u32;
                 let mask = (if size == 1 { 0xff } else { 0xffff }) << shift;
                 let bits = (value as u32) << shift & mask;
-                // Neighbours in the word may be written at the same time.
+                // Another thread may write the word's other bytes at the same time.
                 let _ = word.fetch_update(Relaxed, Relaxed, |old| Some(old & !mask | bits));
             }
         }
     }
 }
 
-/// Where each of 16 lanes accesses.
+/// The addresses of an access in 16 lanes.
 struct Places<'a> {
     /// One view for all lanes, or one for each.
     view: Result<View<'a>, Box<[View<'a>; VECTOR_LANES]>>,
@@ -111,7 +111,7 @@ impl<'a> Places<'a> {
     }
 }
 
-/// The buffer that a bind point's element has.
+/// The buffer at an element of a bind point's array.
 fn buffer<'a>(batch: &Batch<'a>, binding: &Binding, index: u32) -> View<'a> {
     if index >= binding.count {
         return View::EMPTY;
@@ -122,7 +122,7 @@ fn buffer<'a>(batch: &Batch<'a>, binding: &Binding, index: u32) -> View<'a> {
     }
 }
 
-/// Where lanes 16 `vector`.. access. Lanes outside `lanes` may get any place.
+/// The addresses in the 16 lanes of a vector. Lanes outside `lanes` may get any.
 fn places<'a>(batch: &Batch<'a>, address: &Address, vector: usize, lanes: u16) -> Places<'a> {
     let offset = u64::from(address.offset);
     if address.space == Space::Global {
@@ -179,7 +179,7 @@ fn global_places<'a>(
     places
 }
 
-/// Sets 16 lanes of a loaded register.
+/// Writes 16 lanes of a loaded register.
 fn put(
     batch: &Batch<'_>,
     dst: RegisterSlot,
@@ -196,7 +196,7 @@ fn put(
     }
 }
 
-/// Takes 16 lanes of a register to store.
+/// Reads 16 lanes of a register that is stored.
 fn take(
     batch: &Batch<'_>,
     src: RegisterSlot,
@@ -274,7 +274,7 @@ fn load_lanes(batch: &Batch<'_>, dst: &[Reg], address: &Address, format: Format,
     }
 }
 
-/// Loads what is the same in all lanes.
+/// Loads elements that are the same in all lanes.
 fn load_uniform_from(
     batch: &Batch<'_>,
     view: View<'_>,
@@ -411,7 +411,7 @@ pub fn buffer_size(batch: &Batch<'_>, dst: Reg, binding: &Binding) {
     }
 }
 
-/// Changes an element atomically, if it is aligned and within; returns what was there.
+/// Changes an element atomically and returns the old value. Does nothing if it is misaligned or out of range.
 fn update(
     view: View<'_>,
     address: u64,
@@ -437,7 +437,7 @@ fn update(
 
 // Elements of 32 bits in one memory: bounds are checked for 16 lanes at once.
 
-/// How many elements of one access are handled together: those of a vector.
+/// The number of elements of one access that are handled together: those of a four-component vector.
 const TOGETHER: usize = 4;
 
 /// The words that an access may reach, from its offset on.
@@ -461,8 +461,8 @@ impl<'a> Window<'a> {
         }
     }
 
-    /// Where lanes begin, in words from the window's start, if all `count` elements of each of `lanes` are within and
-    /// aligned. The other lanes get some place that is within, too.
+    /// The index of each lane's first word from the window's start. None if an element of one of `lanes` is out of
+    /// range or misaligned. Other lanes get an index that is in range.
     #[inline(always)]
     fn starts<S: Simd>(
         self,
@@ -538,7 +538,7 @@ fn load_words<'a, S: Simd>(
 ) {
     for (part, dst) in dst.chunks(TOGETHER).enumerate() {
         let address = Address {
-            // What overflows is beyond the end of any memory.
+            // An offset that overflows is beyond the end of any memory.
             offset: address.offset.saturating_add((4 * TOGETHER * part) as u32),
             ..*address
         };
@@ -726,7 +726,7 @@ fn atomic_words<S: Simd>(
         combine(op, Format::B32, old, value, comparator.into()) as u32
     };
     if address.space == Space::Shared {
-        // Nobody else has this memory.
+        // No other thread accesses this memory.
         return Some(access.each(|word, value, comparator| {
             let old = word.load(Relaxed);
             word.store(combined(old, value, comparator), Relaxed);
@@ -749,7 +749,7 @@ fn atomic_words<S: Simd>(
     })
 }
 
-/// What the lanes of an atomic operation do.
+/// The operands of an atomic operation.
 struct Access<'a> {
     lanes: u16,
     window: Window<'a>,
@@ -771,9 +771,9 @@ impl Access<'_> {
     }
 }
 
-// Private memory: of each lane. A word of it is a row of vectors, as a varying register is.
+// Private memory of each lane. A word of it is a row of vectors, as a varying register is.
 
-/// A word that doesn't exist.
+/// The row that stands for a word that doesn't exist.
 const NOWHERE: usize = usize::MAX;
 
 /// The rows that 16 lanes access.
@@ -782,7 +782,7 @@ enum Rows {
     Each([usize; VECTOR_LANES]),
 }
 
-/// The row of private memory that a byte address means; [`NOWHERE`] if there is none.
+/// The row of private memory at a byte address; [`NOWHERE`] if there is none.
 #[inline(always)]
 fn private_row(batch: &Batch<'_>, address: u64) -> usize {
     if address.is_multiple_of(4) && address < u64::from(batch.program.private_bytes) {
@@ -811,7 +811,7 @@ fn private_rows(batch: &Batch<'_>, address: &Address, step: u64, vector: usize) 
     }
 }
 
-/// One word of 16 lanes; zero where there is none.
+/// Loads one word for 16 lanes; zero where it doesn't exist.
 #[inline(always)]
 fn private_words(
     batch: &Batch<'_>,
@@ -858,7 +858,7 @@ fn load_private(batch: &Batch<'_>, dst: &[Reg], address: &Address, format: Forma
     }
 }
 
-/// Where the second word of a 64-bit element exists.
+/// The lanes in which the second word of a 64-bit element exists.
 fn second_exists(
     batch: &Batch<'_>,
     address: &Address,

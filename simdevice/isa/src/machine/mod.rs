@@ -1,8 +1,8 @@
 //! Runs programs: a lane-batched interpreter.
 //!
-//! An [`Executable`] is a program made ready for batches of a fixed number of lanes: registers have places, uniform ones
-//! only one vector; control flow is jumps and masks. A [`Machine`] has the registers and memory of one batch at a time
-//! and belongs to one worker. The kernels are compiled for every SIMD level, and the level is dispatched once a batch.
+//! An [`Executable`] is a program made ready for batches of a fixed number of lanes: registers have places, uniform
+//! ones only one vector; control flow is jumps and masks. A [`Machine`] has the registers and memory of one batch at a
+//! time and belongs to one worker. The kernels are compiled for every SIMD level; a batch chooses its level once.
 //!
 //! ```
 //! use std::sync::Arc;
@@ -66,7 +66,7 @@ pub struct Machine {
     shared: Vec<AtomicU32>,
     private: Vec<Vector>,
     work: Work,
-    /// For each counted run, how often it was executed and with how many lanes.
+    /// The executions of each counted run, and the active lanes over them.
     runs: Vec<(u64, u64)>,
 }
 
@@ -102,7 +102,7 @@ impl Machine {
         machine
     }
 
-    /// The executable that it runs.
+    /// The executable that the machine runs.
     pub fn executable(&self) -> &Arc<Executable> {
         &self.executable
     }
@@ -132,8 +132,9 @@ impl Machine {
         slot.start()..slot.start() + count * per_16
     }
 
-    /// An input's lanes, to be filled: 16 to a vector (8 to a vector for `B64`); a uniform input has one vector, of which
-    /// all lanes must be set alike. Bools are 0 or all ones. Empty if the program doesn't read that slot.
+    /// The lanes of an input, for the caller to fill: 16 to a vector (8 to a vector for `B64`). A uniform input has one
+    /// vector, all of whose lanes must be set alike. Bools are 0 or all ones. Empty if the program doesn't read that
+    /// slot.
     ///
     /// Varying inputs must be set before each batch; uniform ones keep their value.
     pub fn input_mut(&mut self, slot: u32) -> &mut [Vector] {
@@ -212,10 +213,9 @@ impl Machine {
         std::mem::take(&mut self.work)
     }
 
-    /// Runs a batch. `active` are the lanes that run; `helpers` those among them that only help with derivatives.
+    /// Runs a batch. `active` are the lanes that run; `helpers` are those among them that only serve derivatives.
     ///
-    /// # Errors
-    /// If the watchdog stopped it; what it wrote until then stays written.
+    /// # Errors Returns an error if the watchdog stopped the batch. Its writes until then remain.
     pub fn run(
         &mut self,
         active: &LaneMask,

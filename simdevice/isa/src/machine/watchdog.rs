@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use thiserror::Error;
 
-/// Why a batch was stopped.
+/// The reason that a batch was stopped.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
 pub enum Stopped {
     /// It ran longer than the watchdog allows.
@@ -14,12 +14,12 @@ pub enum Stopped {
         /// The limit.
         limit: Duration,
     },
-    /// Somebody asked it to stop.
+    /// Another thread asked it to stop.
     #[error("a shader batch was cancelled")]
     Cancelled,
 }
 
-/// How long a batch may run, and a flag that stops it early.
+/// The time limit of a batch, and a flag that stops it early.
 #[derive(Clone, Copy, Debug)]
 pub struct Watchdog<'a> {
     /// The longest time that one batch may take.
@@ -37,10 +37,10 @@ impl Default for Watchdog<'_> {
     }
 }
 
-/// Back edges between two looks at the clock.
+/// Back edges between two readings of the clock.
 const PATIENCE: u32 = 64;
 
-/// A watchdog while a batch runs. The clock is first read after some back edges, so that short programs don't pay.
+/// A watchdog while a batch runs. The clock is first read after some back edges, so that short programs don't read it.
 pub(super) struct Watch<'a> {
     watchdog: Watchdog<'a>,
     left: u32,

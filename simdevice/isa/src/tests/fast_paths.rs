@@ -1,5 +1,5 @@
-//! What the engine takes shortcuts for, beside the same computed lane by lane: at every SIMD level, over batches of many
-//! vectors, some of them partly active or not at all.
+//! The engine's fast paths against results computed lane by lane, at every SIMD level, over batches of many vectors,
+//! some of them partly active or not at all.
 
 use crate::builder::Builder;
 use crate::ir::{Address, AtomicOp, Binding, Format, Program, Rate, Reg, Space, Type};
@@ -41,8 +41,8 @@ fn place(space: Space, base: Reg, offset: u32) -> Address {
     }
 }
 
-/// For each vector a pattern of its own: the same address, consecutive ones, scattered ones; some with a lane that is
-/// beyond the end or misaligned.
+/// Addresses with another pattern in each vector: the same address, consecutive ones, scattered ones; some with a lane
+/// that is out of range or misaligned.
 fn addresses(random: &mut Random, elements: u32) -> Vec<u32> {
     let mut all = Vec::new();
     for _ in 0..LANES / 16 {
@@ -67,7 +67,7 @@ fn addresses(random: &mut Random, elements: u32) -> Vec<u32> {
     all
 }
 
-/// Which lanes take part: all of a vector, some, or none.
+/// The active lanes: all of a vector, some, or none.
 fn participants(random: &mut Random) -> Vec<bool> {
     let mut all = Vec::new();
     for _ in 0..LANES / 16 {
@@ -77,7 +77,7 @@ fn participants(random: &mut Random) -> Vec<bool> {
     all
 }
 
-/// The word that a lane's element is, if it is aligned and within.
+/// The index of the word that holds a lane's element. None if it is misaligned or out of range.
 fn word_at(address: u32, offset: u32, element: u32) -> Option<usize> {
     let at = u64::from(address) + u64::from(offset) + 4 * u64::from(element);
     (at.is_multiple_of(4) && at + 4 <= 4 * u64::from(WORDS)).then_some(at as usize / 4)
@@ -173,7 +173,7 @@ fn words_are_stored_alike_in_bulk_and_one_by_one(case: &Case) {
             run(&mut machine, ACTIVE, &resources);
             for (word, found) in contents(&range).into_iter().enumerate() {
                 let allowed = &allowed[word];
-                // Where lanes collide, one of them wins.
+                // If lanes store to the same word, one of them wins.
                 assert!(
                     allowed.contains(&found) || allowed.is_empty() && found == 0,
                     "word {word} at {name}: {found:#x} of {allowed:x?}"
@@ -213,7 +213,7 @@ fn workgroup_and_buffer_atomics_agree(case: &Case) {
         };
         let mut machine = machine(&program, level, LANES);
         for lane in 0..LANES {
-            // Some are beyond the end, or misaligned.
+            // Some are out of range, or misaligned.
             let at = random.below(270) as u32;
             machine.set_input(0, lane, if lane > 99 { at & !3 } else { at });
             machine.set_input(1, lane, (random.below(1000) as f32).to_bits());
@@ -226,8 +226,8 @@ fn workgroup_and_buffer_atomics_agree(case: &Case) {
     }
 }
 
-/// A table in private memory, read at a uniform and at a varying place. In the twin it is filled under a condition, so
-/// that it isn't known to be a table.
+/// A program that reads a table in private memory, at a uniform and at a varying index. If `hidden`, the table is
+/// filled under a condition, so that the compiler doesn't recognize it.
 fn table(hidden: bool) -> Program {
     let mut b = Builder::new();
     let (uniform, varying) = (
@@ -320,7 +320,7 @@ fn compare(case: &Case, program: &Program, limit: u32, expected: impl Fn(u32) ->
 
 #[gaurast_runner::test(each = gaurast_runner::simd_levels())]
 fn lanes_leave_a_loop_with_their_own_count(case: &Case) {
-    // The counter is the same in all lanes that are still there, and read afterwards by those that left.
+    // The counter is the same in all lanes that are still in the loop; the lanes that left read it afterwards.
     let mut b = Builder::new();
     let wanted = b.input(0, Type::B32, Rate::Varying);
     let out = b.output(0, Type::B32);
@@ -352,8 +352,8 @@ fn lanes_leave_a_loop_with_their_own_count(case: &Case) {
 
 #[gaurast_runner::test(each = gaurast_runner::simd_levels())]
 fn lanes_come_back_to_the_count_that_they_left(case: &Case) {
-    // The inner loop's counter is set before the outer loop alone: a lane that leaves the inner loop early finds its own
-    // count when it comes back.
+    // The inner loop's counter is set only before the outer loop: a lane that leaves the inner loop early finds its own
+    // count when it enters it again.
     let mut b = Builder::new();
     let step = b.input(0, Type::B32, Rate::Varying);
     let out = b.output(0, Type::B32);
@@ -445,7 +445,7 @@ fn short_branches_assign_what_their_lanes_chose(case: &Case) {
     let sum = b.compute(Op::IAdd, &[x, three]);
     b.assign(a, sum);
     b.begin_else();
-    // Reads a variable that the other side assigns.
+    // Reads a variable that the other side of the branch assigns.
     let product = b.compute(Op::IMul, &[a, x]);
     b.assign(c, product);
     b.end();
@@ -496,7 +496,7 @@ fn push_constants_are_loaded_once_and_right(case: &Case) {
     b.assign(i, next);
     b.end();
     b.assign(outputs[0], sum);
-    // Beyond the end.
+    // Out of range.
     let nothing = b.load(push(400), Format::B32, 1)[0];
     b.assign(outputs[1], nothing);
     let program = b.finish().expect("a valid program");

@@ -1,4 +1,4 @@
-//! Loads, stores, atomics and images: what is within, what is beyond, and which lanes take part.
+//! Loads, stores, atomics and images: accesses in range and out of range, by all lanes and by some.
 
 use std::sync::{Arc, Mutex};
 
@@ -45,7 +45,7 @@ fn at(slot: u32, base: Reg, offset: u32) -> Address {
     }
 }
 
-/// Loads at an input address and gives the elements as outputs.
+/// A program that loads elements from an input address into its outputs.
 fn loader(format: Format, count: usize, offset: u32) -> Program {
     let mut b = Builder::new();
     let address = b.input(0, Type::B32, Rate::Varying);
@@ -70,7 +70,7 @@ fn loads_read_what_is_there_and_zero_beyond(case: &Case) {
         buffers: &buffers,
         ..Resources::default()
     };
-    // Consecutive, strided, scattered, beyond the end, and near overflow.
+    // Consecutive, strided, scattered, out of range, and near overflow.
     let patterns: [fn(usize) -> u32; 6] = [
         |lane| 4 * lane as u32,
         |lane| 12 * lane as u32,
@@ -144,7 +144,7 @@ fn stores_touch_only_their_bytes_and_vanish_beyond(case: &Case) {
         .collect();
     let mut machine = machine(&program, level, LANES);
     for lane in 0..LANES {
-        // The last lanes aim beyond the range, and beyond all memory.
+        // The last lanes address bytes beyond the range, and beyond all memory.
         let target = if lane < 60 {
             4 * lane as u32
         } else {
@@ -414,7 +414,7 @@ fn push_constants_and_descriptor_arrays(case: &Case) {
     let mut machine = machine(&program, level, 16);
     (0..16).for_each(|lane| machine.set_input(0, lane, lane as u32));
     run(&mut machine, 16, &resources);
-    // Bind point 3 is empty; what lies beyond the array is not reached.
+    // Bind point 3 is empty; those beyond the array are not used.
     assert_eq!(
         [0, 1, 2, 3, 15].map(|lane| machine.output(0, lane)),
         [10, 20, 0, 0, 0]
@@ -473,7 +473,7 @@ fn device_addresses_reach_their_buffer_and_nothing_else(case: &Case) {
     );
 }
 
-/// Records which lanes wrote which image, and reads back the coordinates.
+/// An image unit that records which lanes wrote which image, and returns the coordinates from reads.
 struct Recorder(Mutex<Vec<(u32, u16)>>);
 
 impl ImageUnit for Recorder {

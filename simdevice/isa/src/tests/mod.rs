@@ -27,7 +27,7 @@ fn level(case: &Case) -> (&str, Level) {
     (name, level.expect("a level of this processor"))
 }
 
-/// Whether a level's multiply-add rounds once.
+/// True if a level's multiply-add rounds once.
 fn fuses(name: &str) -> bool {
     name.starts_with("avx")
 }

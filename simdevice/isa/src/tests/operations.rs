@@ -1,4 +1,4 @@
-//! Every operation with exact results, on a table of awkward operands, in each uniform and varying combination.
+//! Every operation with exact results, on a table of edge cases, with each combination of uniform and varying operands.
 
 use crate::builder::Builder;
 use crate::ir::{Rate, Reg, Type};
@@ -127,7 +127,7 @@ fn table(ty: Type) -> Vec<u64> {
     }
 }
 
-/// Whether two results are the same: equal bits, or both NaN; minimum and maximum may give either zero.
+/// True if two results are the same: equal bits, or both NaN. Minimum and maximum may give either zero.
 fn same(op: Op, got: u64, expected: u64) -> bool {
     if got == expected {
         return true;
@@ -147,7 +147,7 @@ fn same(op: Op, got: u64, expected: u64) -> bool {
     }
 }
 
-/// Operations whose results aren't exact: they have tests of their own.
+/// Reports whether an operation's results aren't exact. Such operations have tests of their own.
 fn is_approximate(op: Op) -> bool {
     let exact = [
         Op::UDiv,
@@ -162,8 +162,8 @@ fn is_approximate(op: Op) -> bool {
     op.kind() == Kind::Special && !exact.contains(&op)
 }
 
-/// Tests an operation on `cases` with `rates` of its operands: a case has one operand for each, uniform ones are the same in
-/// all lanes.
+/// Tests an operation on `cases`, each with one value for each operand. `rates` are the rates of the operands; a
+/// uniform operand is the same in all lanes.
 fn check(case: &Case, op: Op, rates: &[Rate], cases: &[Vec<u64>]) {
     let (name, level) = level(case);
     let signature = op.signature();

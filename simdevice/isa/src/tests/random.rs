@@ -1,4 +1,4 @@
-//! Random structured programs: the batch engine must give what the scalar interpreter gives, lane by lane.
+//! Random structured programs. The batch engine's results must equal the scalar interpreter's, lane by lane.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -43,7 +43,7 @@ const FLOAT: &[Op] = &[Op::FAdd, Op::FSub, Op::FMul, Op::FDiv];
 const INTEGER_TEST: &[Op] = &[Op::IEq, Op::INe, Op::SLt, Op::ULe];
 const FLOAT_TEST: &[Op] = &[Op::FEq, Op::FLt, Op::FLe, Op::FNe];
 
-/// Grows a program. Integers and floats are kept apart, so that no NaN's bits are looked at.
+/// Generates a program. Integers and floats are kept apart, so that no NaN's bits are read.
 struct Grower {
     b: Builder,
     random: Random,
@@ -57,7 +57,7 @@ struct Grower {
     budget: usize,
 }
 
-/// How many registers of each kind are in scope.
+/// The numbers of registers of each kind that are in scope.
 struct Scope(usize, usize, usize);
 
 impl Grower {
@@ -214,7 +214,7 @@ impl Grower {
 
     fn private(&mut self) {
         let index = self.integer();
-        // A little beyond the end, too.
+        // Some addresses are slightly out of range.
         let bound = self.b.u32(PRIVATE_WORDS + 1);
         let word = self.b.compute(Op::URem, &[index, bound]);
         let two = self.b.u32(2);
@@ -233,7 +233,7 @@ impl Grower {
         }
     }
 
-    /// A block; true if it ends by leaving.
+    /// Generates a block.
     fn block(&mut self, depth: usize) {
         let scope = self.enter();
         for _ in 0..1 + self.random.below(6) {
@@ -265,7 +265,7 @@ impl Grower {
         self.leave(&scope);
     }
 
-    /// A statement that leaves, if any may be.
+    /// Generates a statement that leaves a construct, if one can be left. Returns true if it did.
     fn leave_statement(&mut self) -> bool {
         match self.random.below(8) {
             0 => self.b.ret(),
@@ -300,7 +300,7 @@ impl Grower {
         self.b.end();
     }
 
-    /// A loop that ends after a few rounds, however many its body adds by continuing.
+    /// Generates a loop that ends after a few iterations, even if its body continues early.
     fn repeat(&mut self, depth: usize) {
         let scope = self.enter();
         let count = self.b.variable(Type::B32);
@@ -309,7 +309,7 @@ impl Grower {
         let limit = self.b.compute(Op::URem, &[limit, most]);
         self.b.assign(count, zero);
         let label = self.b.begin_loop();
-        // Values of the last round that a lane was in: they may be read after the loop.
+        // Values of the last iteration that a lane was in may be read after the loop.
         let source = self.integer();
         let escaping = self.b.compute(Op::IAdd, &[source, count]);
         let enough = self.b.compute(Op::ULe, &[limit, count]);
@@ -408,7 +408,7 @@ fn inputs(seed: u64, lane: usize) -> [u64; INPUTS] {
     ]
 }
 
-/// What the scalar interpreter gives each lane: outputs and whether it was killed.
+/// The scalar interpreter's results for each lane: the outputs, and true if it was killed.
 fn expected(program: &Program, seed: u64, fused: bool) -> Vec<(Vec<u64>, bool)> {
     let lane = |lane| {
         let mut scalar = Lane::new(program, &inputs(seed, lane), fused);
@@ -436,7 +436,7 @@ fn check(case: &Case, seed: u64, budget: usize) {
         .finish()
         .finish()
         .unwrap_or_else(|problem| panic!("seed {seed}: {problem}"));
-    // Two batches, so that nothing may hang on what an earlier batch left behind.
+    // Two batches: the second shows whether a result depends on state that the first left.
     let rounds = [seed, seed + 1];
     let wanted = rounds.map(|seed| expected(&as_written, seed, fuses(name)));
     let mut machine = machine(&program, level, LANES);
@@ -470,7 +470,7 @@ fn random_programs_equal_the_scalar_interpreter(case: &Case) {
     }
 }
 
-/// Changes a statement somewhere within a block: a register it names, or its place.
+/// Changes a random statement within a block: a register that it names, or its place.
 fn mutate(block: &mut Block, registers: usize, random: &mut Random) {
     if block.is_empty() {
         return;

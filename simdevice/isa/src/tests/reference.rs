@@ -1,11 +1,11 @@
-//! A scalar interpreter: one lane at a time, by the book.
+//! A scalar interpreter that runs one lane at a time, written for clarity.
 
 use std::collections::HashMap;
 
 use crate::ir::{Address, Block, Format, Label, Program, Reg, Space, Statement, Type};
 use crate::op::Op;
 
-/// One lane's run of a program. Programs may use registers, control flow and private memory.
+/// The run of a program in one lane. Programs may use registers, control flow and private memory.
 pub struct Lane<'a> {
     program: &'a Program,
     registers: Vec<u64>,
@@ -14,7 +14,7 @@ pub struct Lane<'a> {
     pub killed: bool,
 }
 
-/// Where control goes after a statement.
+/// The continuation after a statement.
 enum Flow {
     Next,
     Break(Label),
@@ -49,7 +49,7 @@ impl<'a> Lane<'a> {
         lane
     }
 
-    /// Runs it; returns the outputs in the order of the program's.
+    /// Runs the lane. Returns the outputs in the order of the program's.
     pub fn run(&mut self) -> Vec<u64> {
         let program = self.program;
         self.block(&program.body);
@@ -186,7 +186,7 @@ pub fn bool_bits(value: bool) -> u64 {
     if value { u64::from(u32::MAX) } else { 0 }
 }
 
-/// What an operation gives, as exactly as the host's scalar arithmetic does.
+/// The result of an operation, as exact as the host's scalar arithmetic.
 pub fn apply(op: Op, operands: &[u64], fused: bool) -> u64 {
     let at = |index: usize| operands.get(index).copied().unwrap_or(0);
     let (a, b, c) = (at(0), at(1), at(2));
@@ -475,7 +475,7 @@ fn apply64(op: Op, a: u64, b: u64, c: u64) -> u64 {
     }
 }
 
-/// By halving and doubling.
+/// `frexp` by halving and doubling.
 fn frexp(mut a: f64) -> (f64, i32) {
     let mut exponent = 0;
     if a == 0.0 || !a.is_finite() {
@@ -492,7 +492,7 @@ fn frexp(mut a: f64) -> (f64, i32) {
     (a, exponent)
 }
 
-/// By doubling, or by halving the exponent until one division by a power of two is left.
+/// `ldexp` by doubling, or by halving until one division by a power of two is left.
 fn ldexp(mut a: f64, mut exponent: i32) -> f64 {
     if a == 0.0 || !a.is_finite() {
         return a;

@@ -25,8 +25,8 @@ fn program(f: impl FnOnce(&mut Builder, Reg) -> Reg) -> Program {
     b.finish().expect("a valid program")
 }
 
-/// Runs it with `lane * 3 + 1` as input and all lanes but every fifth active; gives each lane's input, and result if it is
-/// active.
+/// Runs a program with `lane * 3 + 1` as input and all lanes but every fifth active. Returns each lane's input, and its
+/// result if it is active.
 fn results(case: &Case, program: &Program) -> Vec<(u32, Option<u32>)> {
     let (_, level) = level(case);
     let options = Options {
@@ -60,7 +60,7 @@ fn results(case: &Case, program: &Program) -> Vec<(u32, Option<u32>)> {
         .collect()
 }
 
-/// Asserts that each active lane gets what `expected(own index in the subgroup, its active inputs by index)` says.
+/// Asserts that each active lane gets `expected(own index in the subgroup, its active inputs by index)`.
 fn check(case: &Case, program: &Program, expected: impl Fn(usize, &[Option<u32>]) -> u32) {
     for group in results(case, program).chunks(SIZE) {
         let inputs: Vec<Option<u32>> = group

@@ -52,7 +52,7 @@ fn ulp(value: f64) -> f64 {
     2f64.powi(magnitude.log2().floor() as i32 - 23)
 }
 
-/// Floats of all sizes between two positive ones and their negatives, evenly by bits.
+/// Floats between two positive ones, and their negatives, evenly spaced by their bits.
 fn samples(low: f32, high: f32) -> Vec<(f32, f32)> {
     let (low, high) = (low.to_bits(), high.to_bits());
     let step = ((high - low) / 20_000).max(1) as usize;
@@ -60,7 +60,7 @@ fn samples(low: f32, high: f32) -> Vec<(f32, f32)> {
     positive.flat_map(|x| [(x, 0.0), (-x, 0.0)]).collect()
 }
 
-/// Asserts that the error is at most `bound(x, exact)`, an absolute number; infinities and NaN must agree.
+/// Asserts that the absolute error is at most `bound(x, exact)`; infinities and NaN must agree.
 fn check_error(
     case: &Case,
     op: Op,
@@ -100,7 +100,7 @@ fn check_error(
     });
 }
 
-/// Within so many units in the last place.
+/// An error bound of a number of units in the last place.
 fn ulps(count: f64) -> impl Fn(f64, f64) -> f64 {
     move |_, expected| count * ulp(expected)
 }
@@ -148,7 +148,7 @@ fn powers(case: &Case) {
         (f32::INFINITY, 2.0),
         (f32::INFINITY, -1.0),
     ]);
-    // As exp2(y log2(x)): 3 ULP of the logarithm, scaled by y, and 3 + 2|y log2(x)| ULP of the exponential.
+    // The bound of exp2(y log2(x)): 3 ULP of the logarithm, scaled by y, and 3 + 2|y log2(x)| ULP of the exponential.
     check_error(
         case,
         Op::FPow,
