@@ -1,26 +1,26 @@
-//! Everything that can be chosen of the hardware, in one typed TOML file, and the presets. Where each number comes
-//! from is written beside it in `presets/paper-15x16.toml`; a preset may inherit from another.
+//! The configuration of the hardware, read from a typed TOML file, and the presets. `presets/paper-15x16.toml` gives
+//! the source of each number; a preset may inherit from another.
 
 use crate::work::{Mode, Saturation, TILE_SIDES};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use toml::{Table, Value};
 
-/// The hardware.
+/// The configuration of the hardware.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Config {
     /// The rasterizer modules.
     pub rasterizer: Rasterizer,
-    /// Main memory, which all share.
+    /// Main memory, shared by all units.
     pub memory: Memory,
     /// The shader cores.
     pub shader: Shader,
-    /// Stage 3 on the shader cores, where there is no rasterizer for it.
+    /// Stage 3 on the shader cores, for a configuration without a rasterizer.
     pub baseline: Baseline,
     /// The chip around them.
     pub soc: Soc,
-    /// How frames follow each other.
+    /// The overlap of frames.
     pub schedule: ScheduleConfig,
     /// Energy.
     pub energy: EnergyConfig,
@@ -42,42 +42,45 @@ pub enum Lists {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Rasterizer {
-    /// How many; 0: stage 3 runs on the shader cores.
+    /// The number of modules. If 0, stage 3 runs on the shader cores.
     pub modules: u32,
-    /// Processing elements of one.
+    /// Processing elements of a module.
     pub pes_per_module: u32,
     /// Clock in GHz.
     pub clock_ghz: f64,
     /// Cycles from one pixel to the next in a PE, in Gaussian mode.
     pub gaussian_interval: u32,
-    /// The same in triangle mode.
+    /// Cycles from one pixel to the next in a PE, in triangle mode.
     pub triangle_interval: u32,
     /// Cycles from operands to the blended pixel.
     pub gaussian_latency: u32,
     /// Cycles from operands to weights and depth.
     pub triangle_latency: u32,
-    /// Cycles from a pixel's transmittance to its next one: two Gaussians that share a pixel cannot begin closer.
+    /// Cycles from a pixel's transmittance to its next one: two Gaussians that share a pixel can't begin closer to each
+    /// other.
     pub carried_latency: u32,
-    /// The share of Gaussians that share a group of pixels with the one before them, where their groups are too few to say.
+    /// The share of Gaussians taken to share a group of pixels with the one before, if the numbers of groups don't
+    /// decide it.
     pub neighbour_sharing: f64,
-    /// Whether opacity is folded into the exponent; if not, a Gaussian takes a multiplication more than there are
+    /// True if opacity is folded into the exponent. If not, a Gaussian takes one multiplication more than there are
     /// multipliers, and its interval is one cycle longer.
     pub opacity_folded: bool,
-    /// What finished pixels are spared.
+    /// The granularity at which finished pixels are skipped, for Gaussians.
     pub saturation: Saturation,
-    /// Which pixels of a tile a triangle is evaluated at: those of the 4x4 blocks that it covers (`reached`), or all.
+    /// The pixels of a tile at which a triangle is evaluated: those of the 4x4 blocks that it covers (`reached`), or
+    /// all.
     pub triangle_traversal: Saturation,
-    /// Whether a primitive that all of a tile's depths hide is dropped before its pixels are evaluated.
+    /// True if a primitive that all of a tile's depths hide is dropped before its pixels are evaluated.
     pub hierarchical_depth: bool,
-    /// Pixels along a side of a tile: 16, or 8, 32 and 64 as an estimate.
+    /// The side of a tile in pixels: 16, or 8, 32 and 64 as an estimate.
     pub tile_side: u32,
     /// Primitives that half of the ping-pong tile buffer holds.
     pub batch: u32,
-    /// Tile lists that the rasterizer takes.
+    /// The kind of the tile lists.
     pub lists: Lists,
-    /// Numbers that a primitive brings in.
+    /// Numbers that are read for a primitive.
     pub numbers_in: u32,
-    /// Numbers that a pixel takes out.
+    /// Numbers that are written for a pixel.
     pub numbers_out: u32,
     /// Bytes of a number.
     pub number_bytes: u32,
@@ -92,12 +95,12 @@ pub struct Rasterizer {
 }
 
 impl Rasterizer {
-    /// All PEs.
+    /// The number of PEs of all modules.
     pub fn pes(&self) -> u32 {
         self.modules * self.pes_per_module
     }
 
-    /// Which pixels are spared in a mode.
+    /// The granularity at which pixels are skipped in a mode.
     pub fn granularity(&self, mode: Mode) -> Saturation {
         match mode {
             Mode::Triangle => self.triangle_traversal,
@@ -127,9 +130,10 @@ impl Rasterizer {
         pixels.div_ceil(u64::from(self.pes_per_module)) * u64::from(self.interval(mode))
     }
 
-    /// Cycles in which the PEs wait for a pixel's transmittance after a primitive that is evaluated in `groups` of `open`
-    /// groups of 16 pixels. Triangles carry none. Two Gaussians that need not share a pixel, since each takes at most half
-    /// of the open groups, wait for the share of their cycles that [`Self::neighbour_sharing`] says, whole ones.
+    /// Cycles in which the PEs wait for a pixel's transmittance after a primitive that is evaluated in `groups` of
+    /// `open` groups of 16 pixels. Triangles have no transmittance. If each of two Gaussians takes at most half of the
+    /// open groups, they need not share a pixel, and the cycles are multiplied by [`Self::neighbour_sharing`] and
+    /// rounded.
     pub fn waiting_cycles(&self, mode: Mode, groups: u64, open: u64) -> u64 {
         if mode == Mode::Triangle || groups == 0 {
             return 0;
@@ -142,17 +146,17 @@ impl Rasterizer {
         (most as f64 * self.neighbour_sharing).round() as u64
     }
 
-    /// Cycles of the controller for a primitive of which no pixel is evaluated.
+    /// Cycles of the controller for a primitive that is evaluated at no pixel.
     pub fn looking_cycles(groups: u64) -> u64 {
         u64::from(groups == 0)
     }
 
-    /// Bytes that a primitive of a tile's list brings in.
+    /// Bytes read for a primitive of a tile's list.
     pub fn primitive_bytes(&self) -> u32 {
         self.numbers_in * self.number_bytes + self.index_bytes
     }
 
-    /// Bytes that a tile takes out.
+    /// Bytes written for a tile.
     pub fn tile_bytes(&self) -> u32 {
         self.tile_side * self.tile_side * self.numbers_out * self.number_bytes
     }
@@ -162,15 +166,15 @@ impl Rasterizer {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Memory {
-    /// Peak, in GB/s.
+    /// Peak bandwidth in GB/s.
     pub bandwidth_gb_s: f64,
-    /// What of the peak streams reach.
+    /// The share of the peak that streams reach.
     pub efficiency: f64,
-    /// Until the first byte of a request, in ns.
+    /// The latency until the first byte of a request, in ns.
     pub latency_ns: f64,
 }
 
-/// The shader cores: per SM and cycle, lanes.
+/// The shader cores. Rates are lanes per SM and cycle.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[allow(
@@ -186,7 +190,7 @@ pub struct Shader {
     pub wide_per_cycle: f64,
     pub memory_per_cycle: f64,
     pub image_per_cycle: f64,
-    /// Of the issue slots, those used.
+    /// The share of issue slots that are used.
     pub efficiency: f64,
 }
 
@@ -201,11 +205,11 @@ impl Shader {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Baseline {
-    /// Tile lists that it takes.
+    /// The kind of the tile lists.
     pub lists: Lists,
     /// 32-bit operations per pixel and primitive.
     pub operations_per_evaluation: f64,
-    /// Of the issue slots, those used.
+    /// The share of issue slots that are used.
     pub efficiency: f64,
 }
 
@@ -217,30 +221,30 @@ pub struct Soc {
     pub power_w: f64,
     /// Area in mm2.
     pub area_mm2: f64,
-    /// How much smaller a circuit of the rasterizer's technology is in the chip's.
+    /// The factor by which a circuit's area shrinks from the rasterizer's technology to the chip's.
     pub node_scaling: f64,
 }
 
-/// How frames follow each other.
+/// The overlap of frames.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ScheduleConfig {
-    /// Whether the next frame's stages 1 and 2 run while a frame is rasterized.
+    /// True if the next frame's stages 1 and 2 run while a frame is rasterized.
     pub collaborative: bool,
-    /// Frames begun and not ended, at most.
+    /// The most frames that have begun and not ended.
     pub frames_in_flight: u32,
 }
 
-/// Energy: picojoules of the reference technology, except where said.
+/// Energy: picojoules of the reference technology, unless a field says otherwise.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[allow(missing_docs, reason = "the operation or byte is in the name")]
 pub struct EnergyConfig {
-    /// What a module draws at the calibration frames' mean activity, in W; 0: nothing is known of it.
+    /// The power of a module in W at the calibration frames' mean activity; 0 if unknown.
     pub module_power_w: f64,
-    /// Of that, the static part.
+    /// The static share of that power.
     pub static_share: f64,
-    /// Rasterizer pJ per pJ of this table; 0: calibrated.
+    /// Rasterizer pJ per pJ of this table; 0 to calibrate it.
     pub scale: f64,
     pub add_pj: f64,
     pub mul_pj: f64,
@@ -248,7 +252,7 @@ pub struct EnergyConfig {
     pub exp_pj: f64,
     pub buffer_pj_per_byte: f64,
     pub dram_pj_per_byte: f64,
-    /// Evaluations of the calibration frames that are blended.
+    /// The share of the calibration frames' evaluations that are blended.
     pub blended_share: f64,
 }
 
@@ -262,15 +266,15 @@ pub struct AreaConfig {
     pub add_um2: f64,
     pub mul_um2: f64,
     pub div_um2: f64,
-    /// 0: solved from `enhanced_ratio`.
+    /// The area of the exponential unit; 0 to solve it from `enhanced_ratio`.
     pub exp_um2: f64,
     pub half_add_um2: f64,
     pub half_mul_um2: f64,
-    /// Area added by Gaussians over that of the units that were there.
+    /// Area added for Gaussians over the area of the triangle units.
     pub enhanced_ratio: f64,
 }
 
-/// Why a configuration could not be read.
+/// The reason that a configuration can't be read.
 #[derive(Debug, thiserror::Error)]
 pub enum ConfigError {
     /// No preset has this name.
@@ -288,9 +292,9 @@ pub enum ConfigError {
     /// Several sections have a field of this name.
     #[error("there are several fields {name}: {}", among.join(", "))]
     Ambiguous {
-        /// What was asked for.
+        /// The name in the setting.
         name: String,
-        /// Their full names.
+        /// The full names of the fields.
         among: Vec<String>,
     },
     /// A number is out of its range.
@@ -300,10 +304,10 @@ pub enum ConfigError {
         field: String,
         /// The number as it is written.
         value: String,
-        /// The numbers that are allowed.
+        /// The numbers that the field may have.
         range: Range,
     },
-    /// Presets inherit from each other in a circle, or too deeply.
+    /// Presets inherit from each other in a cycle, or too deeply.
     #[error("{0} inherits from too many")]
     Inheritance(String),
 }
@@ -325,7 +329,7 @@ const PRESETS: &[(&str, &str)] = &[
     ("m2-pro", include_str!("../presets/m2-pro.toml")),
 ];
 
-/// The preset that is used where none is named.
+/// The preset for callers that name none.
 pub const DEFAULT_PRESET: &str = "paper-15x16";
 
 /// The names of the presets.
@@ -333,14 +337,14 @@ pub fn preset_names() -> Vec<&'static str> {
     PRESETS.iter().map(|(name, _)| *name).collect()
 }
 
-/// Numbers that a field may have.
+/// A range of a field's numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Range {
-    /// Both ends are in it.
+    /// From the first to the second, both included.
     From(f64, f64),
-    /// The lower end is not in it.
+    /// From the first to the second, without the first.
     Above(f64, f64),
-    /// These alone.
+    /// Only these numbers.
     OneOf(&'static [u32]),
 }
 
@@ -431,7 +435,8 @@ const RANGES: &[(&str, &str, Range)] = {
     ]
 };
 
-/// Checks that every number of a configuration's table is in its range; what is missing or no number is left to serde.
+/// Checks that every number of a configuration's table is in its range. Missing fields and other types are left to
+/// serde.
 fn check(table: &Table) -> Result<(), ConfigError> {
     for &(section, field, range) in RANGES {
         let value = table.get(section).and_then(|fields| fields.get(field));
@@ -451,7 +456,7 @@ fn check(table: &Table) -> Result<(), ConfigError> {
     Ok(())
 }
 
-/// Levels of inheritance.
+/// The most levels of inheritance.
 const MAX_DEPTH: usize = 8;
 
 fn parse(text: &str) -> Result<Table, ConfigError> {
@@ -467,7 +472,7 @@ fn preset_table(name: &str, depth: usize) -> Result<Table, ConfigError> {
     resolve(parse(text)?, depth)
 }
 
-/// The table with what it inherits.
+/// The table merged with the presets that it inherits from.
 fn resolve(mut table: Table, depth: usize) -> Result<Table, ConfigError> {
     let Some(parent) = table.remove("inherits") else {
         return Ok(table);
@@ -493,26 +498,23 @@ fn resolve(mut table: Table, depth: usize) -> Result<Table, ConfigError> {
 }
 
 impl Config {
-    /// A preset with settings on top, each `section.field=value`, or `field=value` where one section alone has it.
+    /// A preset changed by settings, each `section.field=value`, or `field=value` if only one section has the field.
     ///
-    /// # Errors
-    /// [`ConfigError`] for unknown names and impossible values.
+    /// # Errors Returns a [`ConfigError`] for unknown names and numbers out of range.
     pub fn preset(name: &str, settings: &[String]) -> Result<Self, ConfigError> {
         Self::from_table(preset_table(name, 0)?, settings)
     }
 
-    /// A configuration from a file's text, which may inherit from a preset, with settings on top.
+    /// A configuration from a file's text, which may inherit from a preset, changed by settings.
     ///
-    /// # Errors
-    /// As for [`Self::preset`].
+    /// # Errors As for [`Self::preset`].
     pub fn parse(text: &str, settings: &[String]) -> Result<Self, ConfigError> {
         Self::from_table(resolve(parse(text)?, 0)?, settings)
     }
 
-    /// The configuration with settings on top.
+    /// The configuration changed by settings.
     ///
-    /// # Errors
-    /// As for [`Self::preset`].
+    /// # Errors As for [`Self::preset`].
     pub fn with(&self, settings: &[String]) -> Result<Self, ConfigError> {
         let table = Table::try_from(self).map_err(|error| ConfigError::Toml(error.to_string()))?;
         Self::from_table(table, settings)
@@ -532,7 +534,7 @@ impl Config {
     }
 }
 
-/// Sets a field by its full name, or by its own where that is unique.
+/// Sets a field by its full name, or by its own if only one section has it.
 fn set(table: &mut Table, name: &str, text: &str) -> Result<(), ConfigError> {
     let unknown = || ConfigError::UnknownField(name.to_owned());
     let full = match name.split_once('.') {
@@ -689,7 +691,7 @@ mod tests {
                     .filter(|(s, f, _)| (s, f) == (&section.as_str(), &name.as_str()));
                 assert_eq!(of_it.count(), 1, "{section}.{name}");
                 count += 1;
-                // Nothing is no number.
+                // NaN is in no range.
                 let nan = Config::preset("paper-15x16", &[format!("{section}.{name}=nan")]);
                 assert!(nan.is_err(), "{section}.{name}");
             }

@@ -1,7 +1,7 @@
-//! Energy: what each operation and byte costs, times how many there were. The table is of 45 nm (Horowitz, ISSCC 2014);
-//! one factor scales it to the rasterizer's technology, and everything that the table leaves out (clock tree, control,
-//! wires) with it. The factor is calibrated so that a module at the mean activity of the calibration frames draws what
-//! the paper says a module typically draws.
+//! Energy: the number of operations and bytes, times the energy of each. The table is of 45 nm (Horowitz, ISSCC 2014).
+//! One factor scales it to the rasterizer's technology and includes everything that the table leaves out (clock tree,
+//! control, wires). The factor is calibrated so that a module at the mean activity of the calibration frames draws the
+//! paper's typical power of a module.
 
 use crate::config::{Config, EnergyConfig, Rasterizer};
 use crate::pe::Operations;
@@ -9,14 +9,14 @@ use crate::raster::RasterReport;
 use crate::work::Mode;
 use serde::Serialize;
 
-/// Millijoules, by where they go.
+/// Energy in millijoules, by component.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Energy {
     /// Adders, multipliers, divider, exponential.
     pub arithmetic: f64,
     /// Tile buffers.
     pub buffers: f64,
-    /// Modules, whatever they do.
+    /// Leakage of the modules.
     pub leakage: f64,
     /// Main memory, for the rasterizer.
     pub memory: f64,
@@ -25,12 +25,12 @@ pub struct Energy {
 }
 
 impl Energy {
-    /// The modules alone.
+    /// The energy of the modules alone.
     pub fn modules(&self) -> f64 {
         self.arithmetic + self.buffers + self.leakage
     }
 
-    /// All of it.
+    /// The sum over all components.
     pub fn total(&self) -> f64 {
         self.modules() + self.memory + self.shader_cores
     }
@@ -47,7 +47,7 @@ impl Energy {
     }
 }
 
-/// pJ of operations in the table's technology.
+/// The energy of operations, in pJ of the table's technology.
 fn operations_pj(count: Operations, energy: &EnergyConfig) -> f64 {
     count.add as f64 * energy.add_pj
         + count.mul as f64 * energy.mul_pj
@@ -55,15 +55,15 @@ fn operations_pj(count: Operations, energy: &EnergyConfig) -> f64 {
         + count.exp as f64 * energy.exp_pj
 }
 
-/// pJ of one evaluation in the table's technology: arithmetic, then buffers. `blended` is the share of evaluations whose
-/// Gaussian is blended; the others' blending is gated.
+/// The energy of one evaluation, in pJ of the table's technology: arithmetic, then buffers. `blended` is the share of
+/// evaluations whose Gaussian is blended; for the others the units for blending are gated.
 pub fn evaluation_pj(mode: Mode, blended: f64, config: &Config) -> [f64; 2] {
     let (energy, raster) = (&config.energy, &config.rasterizer);
     let number = f64::from(raster.number_bytes);
     match mode {
         Mode::Triangle => {
             let out = f64::from(raster.numbers_out) * number;
-            // Depth is read and compared at each pixel; what passes is written.
+            // Depth is read and compared at each pixel; pixels that pass are written.
             let bytes = number + out * blended;
             [
                 operations_pj(Operations::TRIANGLE, energy),
@@ -73,18 +73,18 @@ pub fn evaluation_pj(mode: Mode, blended: f64, config: &Config) -> [f64; 2] {
         Mode::Gaussian => {
             let all = operations_pj(Operations::GAUSSIAN, energy);
             let gated = operations_pj(Operations::BLEND, energy) * (1.0 - blended);
-            // Transmittance is read at each pixel; colour is read, and both are written, where it is blended.
+            // Transmittance is read at each pixel. Where the Gaussian is blended, colour is read and both are written.
             let bytes = number + blended * number * (2.0 * f64::from(raster.numbers_out) + 1.0);
             [all - gated, bytes * energy.buffer_pj_per_byte]
         }
     }
 }
 
-/// pJ of a module's cycle in which all PEs evaluate, in the table's technology.
+/// The energy of a module's cycle in which all PEs evaluate, in pJ of the table's technology.
 fn busy_cycle_pj(mode: Mode, config: &Config) -> f64 {
     let raster: &Rasterizer = &config.rasterizer;
     let [arithmetic, buffers] = evaluation_pj(mode, config.energy.blended_share, config);
-    // A primitive passes through the buffer once for all PEs: written, then read.
+    // A primitive passes through the buffer once for all PEs: it is written, then read.
     let pixels = f64::from(raster.tile_side).powi(2) * f64::from(raster.interval(mode))
         / f64::from(raster.pes_per_module);
     let primitive =
@@ -93,14 +93,14 @@ fn busy_cycle_pj(mode: Mode, config: &Config) -> f64 {
     f64::from(raster.pes_per_module) * (arithmetic + buffers) / interval + primitive
 }
 
-/// The utilization of the calibration frames: the paper's scenes keep the PEs busy all but the edges of tiles.
+/// The utilization of the calibration frames: in the paper's scenes, PEs idle only at the edges of tiles.
 pub const CALIBRATION_UTILIZATION: f64 = 0.95;
 
 /// PEs of the module whose power the paper gives.
 const MEASURED_PES: u32 = 16;
 
-/// The hardware whose power is known: this one with modules of the paper's width or, where nothing is known of its power,
-/// the paper's own.
+/// The hardware whose power is known: this one with modules of the paper's width or, if its power is unknown, the
+/// paper's own.
 fn measured(config: &Config) -> Config {
     let known = config.energy.module_power_w > 0.0;
     let mut measured = match (known, Config::preset(crate::config::DEFAULT_PRESET, &[])) {
@@ -111,7 +111,7 @@ fn measured(config: &Config) -> Config {
     measured
 }
 
-/// pJ of the rasterizer's technology per pJ of the table.
+/// The scale factor: pJ of the rasterizer's technology per pJ of the table.
 pub fn scale(config: &Config) -> f64 {
     if config.energy.scale > 0.0 {
         return config.energy.scale;
@@ -122,7 +122,7 @@ pub fn scale(config: &Config) -> f64 {
     picojoules / (busy_cycle_pj(Mode::Gaussian, &measured) * CALIBRATION_UTILIZATION)
 }
 
-/// Static power of a module in W. It grows with the PEs, and narrower units leak less, as they are smaller.
+/// The static power of a module in W. It grows with the number of PEs; narrower units are smaller and leak less.
 pub fn static_w(config: &Config) -> f64 {
     let measured = measured(config);
     let mut alike = config.clone();
@@ -136,14 +136,14 @@ pub fn static_w(config: &Config) -> f64 {
 /// Shares of evaluations that changed a pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Changed {
-    /// Of Gaussians': those that were blended.
+    /// The share of Gaussians' evaluations that were blended.
     pub blended: f64,
-    /// Of triangles': those that were covered and passed the early tests.
+    /// The share of triangles' evaluations that were covered and passed the early tests.
     pub covered: f64,
 }
 
 impl Changed {
-    /// The same share of both.
+    /// The same share for both.
     pub fn both(share: f64) -> Self {
         Self {
             blended: share,
@@ -152,7 +152,7 @@ impl Changed {
     }
 }
 
-/// What stage 3 of a frame spent on the rasterizer.
+/// The energy of stage 3 of a frame on the rasterizer.
 pub fn rasterizer(report: &RasterReport, changed: Changed, config: &Config) -> Energy {
     let scale = scale(config) * 1e-9;
     let mut energy = Energy::default();
@@ -173,7 +173,8 @@ pub fn rasterizer(report: &RasterReport, changed: Changed, config: &Config) -> E
     energy
 }
 
-/// What the shader cores spent, working for so many milliseconds: the paper's baseline is the chip's power times time.
+/// The energy in mJ of shader cores that work for `milliseconds`: the power of the paper's baseline chip times the
+/// time.
 pub fn shader_cores_mj(milliseconds: f64, config: &Config) -> f64 {
     milliseconds * config.soc.power_w
 }
@@ -209,7 +210,7 @@ mod tests {
         let report = report(&config);
         let energy = rasterizer(&report, Changed::both(config.energy.blended_share), &config);
         let watts = energy.modules() / report.milliseconds(config.rasterizer.clock_ghz);
-        // This frame is busier than the calibration frames.
+        // This frame keeps the PEs busier than the calibration frames do.
         let dynamic = 1.7 * 0.8 * report.utilization() / CALIBRATION_UTILIZATION;
         assert!(
             (watts - (dynamic + 1.7 * 0.2)).abs() < 0.02,

@@ -1,10 +1,10 @@
 //! The fast model: closed form from event to event.
 //!
 //! With two halves of a tile buffer, a module proceeds in steps: while one batch is evaluated, the next is fetched, and
-//! the longer of the two is the step's length. Where memory is not contended, a stretch of `n` equal steps takes
-//! `n max(c, b / h)` cycles, for `c` cycles of evaluation and `b` bytes a step at `h` bytes per cycle, and nothing in it
-//! is simulated. Where the modules' ports together are wider than main memory, steps are taken one by one, and time
-//! leaps to whatever ends first: an evaluation, a fetch or a write, each of them at a share that is constant in between.
+//! the longer of the two is the step's length. Without contention for memory, `n` equal steps take `n max(c, b / h)`
+//! cycles, for `c` cycles of evaluation and `b` bytes a step at `h` bytes per cycle, so they are not simulated one by
+//! one. If the modules' ports together are wider than main memory, steps are simulated one by one: time advances to the
+//! next end of an evaluation, a fetch or a write, each at a rate that is constant in between.
 
 use crate::config::{Config, Rasterizer};
 use crate::plan::{self, Part, Rates, Task};
@@ -13,16 +13,16 @@ use crate::work::{FrameWork, Mode, Segment};
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, VecDeque};
 
-/// A tile in a module, from the first primitive that is evaluated to the last.
+/// The time that a tile spends in a module, from its first evaluated primitive to its last.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TileSpan {
     /// The module, from 0.
     pub module: usize,
     /// Column and row of the tile.
     pub at: [u32; 2],
-    /// Cycles from the first fetch of all.
+    /// The begin, in cycles from the frame's first fetch.
     pub begin: f64,
-    /// The same.
+    /// The end, in the same cycles.
     pub end: f64,
 }
 
@@ -31,7 +31,7 @@ pub fn rasterize(frame: &FrameWork, config: &Config, others_gb_s: f64) -> Raster
     rasterize_tiles(frame, config, others_gb_s).0
 }
 
-/// The same, with what each module was at: of each module its tiles in order, module after module.
+/// Rasterizes like [`rasterize`], and returns also the tiles of each module in order, module after module.
 pub fn rasterize_tiles(
     frame: &FrameWork,
     config: &Config,
@@ -55,7 +55,7 @@ pub fn rasterize_tiles(
         apart(&mut modules, &mut queue, raster, &mut report)
     };
     report.cycles = now;
-    // Steps wait for memory for as long as they last beyond their evaluation.
+    // The part of the steps' time that exceeds evaluation is waiting for memory.
     let evaluation = report.modules.total();
     let lasted: f64 = modules.iter().map(|module| module.lasted).sum();
     report.modules.memory = (lasted - evaluation).max(0.0);
@@ -68,8 +68,8 @@ pub fn rasterize_tiles(
     (report, spans)
 }
 
-/// Lets modules that share main memory work until the queue is empty, and tells the cycles of it: at each event, all
-/// shares may change.
+/// Runs modules that share main memory until the queue is empty, and returns the cycles. At each event the rates of all
+/// ports may change.
 fn together<'a>(
     modules: &mut [Module],
     queue: &mut impl Iterator<Item = &'a Task>,
@@ -98,15 +98,15 @@ fn together<'a>(
     }
 }
 
-/// The same for modules that never wait for each other: each goes from event to event alone, and tiles are claimed in
-/// the order of time.
+/// Runs modules that never wait for each other until the queue is empty, and returns the cycles. Each goes from event
+/// to event alone, and tiles are claimed in the order of time.
 fn apart<'a>(
     modules: &mut [Module],
     queue: &mut impl Iterator<Item = &'a Task>,
     raster: &Rasterizer,
     report: &mut RasterReport,
 ) -> f64 {
-    // Times are not negative, and so in the order of their bits.
+    // Times are not negative, so their bits have the same order.
     let event = |index: usize, module: &Module| {
         let next = module.now + module.next_event(module.rates.port);
         next.is_finite().then(|| Reverse((next.to_bits(), index)))
@@ -127,36 +127,36 @@ fn apart<'a>(
     now
 }
 
-/// What is left of a module's step, its port apart.
+/// The rest of a module's current step, except for its port's transfers.
 #[derive(Clone, Copy, Debug)]
 struct Step {
     /// Cycles of evaluation.
     cycles: f64,
-    /// Whether evaluation begins a tile, for whose pixels there must be room.
+    /// True if evaluation begins a tile: a half of the buffer must be free for its pixels.
     first_of_tile: bool,
 }
 
-/// What a port moves, in order.
+/// A transfer of a port. A port does its transfers in order.
 #[derive(Clone, Copy, Debug)]
 struct Request {
-    /// Cycles until the first byte, from when the port gets to it.
+    /// Cycles until the first byte, counted from when the port begins the transfer.
     latency: f64,
     bytes: f64,
-    /// Pixels, which no step waits for.
+    /// True for a write of pixels, which no step waits for.
     write: bool,
 }
 
-/// Bytes that count as none, after rounding.
+/// A remainder of bytes that counts as zero, because of rounding.
 const SLACK: f64 = 1e-6;
 
-/// Batches that cost alike.
+/// Batches of the same cost.
 #[derive(Clone, Copy, Debug)]
 struct Batches {
     mode: Mode,
     count: f64,
     cycles: f64,
     bytes: f64,
-    /// Fetched in vain; what is fetched next could not be foreseen.
+    /// True if they are fetched and then discarded. The fetch after them can't be made ahead.
     wasted: bool,
     first_of_tile: bool,
     last_of_tile: bool,
@@ -164,11 +164,11 @@ struct Batches {
 
 #[derive(Debug)]
 struct Module {
-    /// Cycles from the first fetch of all.
+    /// The time, in cycles from the frame's first fetch.
     now: f64,
     /// Tiles that were claimed and whose evaluation has not begun.
     places: VecDeque<[u32; 2]>,
-    /// Tiles of which evaluation began, the last of which may not have ended.
+    /// Tiles whose evaluation has begun. The last may not have ended.
     spans: Vec<TileSpan>,
     rates: Rates,
     contended: bool,
@@ -178,9 +178,9 @@ struct Module {
     mode: Option<Mode>,
     step: Option<Step>,
     port: VecDeque<Request>,
-    /// Cycles in steps.
+    /// Cycles spent in steps.
     lasted: f64,
-    /// The step evaluates a tile's last batch, in this mode.
+    /// The mode of the tile whose last batch the step evaluates, if it does.
     tile_ended: Option<Mode>,
 }
 
@@ -203,28 +203,28 @@ impl Module {
         }
     }
 
-    /// Whether the port moves bytes.
+    /// True if the port moves bytes.
     fn asks(&self) -> bool {
         self.port
             .front()
             .is_some_and(|request| request.latency <= 0.0)
     }
 
-    /// Whether evaluation waits for pixels to be written: two halves hold pixels.
+    /// True if evaluation waits for pixels to be written: two halves hold pixels.
     fn is_blocked(&self, step: &Step) -> bool {
-        // What has been evaluated has had its room.
+        // A step whose evaluation has ended does not wait for a free half.
         step.first_of_tile
             && step.cycles > 0.0
             && self.port.iter().filter(|request| request.write).count() > 1
     }
 
-    /// Whether the step has ended, and everything with it that it waits for.
+    /// True if the step has ended, with all transfers that it waits for.
     fn is_done(&self) -> bool {
         self.step
             .is_some_and(|step| step.cycles <= 0.0 && self.port.iter().all(|request| request.write))
     }
 
-    /// Cycles until something ends.
+    /// Cycles until the next end of an evaluation, a latency or a transfer.
     fn next_event(&self, share: f64) -> f64 {
         let mut next = f64::INFINITY;
         if let Some(step) = &self.step
@@ -235,13 +235,13 @@ impl Module {
         }
         match self.port.front() {
             Some(request) if request.latency > 0.0 => next.min(request.latency),
-            // A port moves one request in a cycle: what is left of the cycle is lost.
+            // A port moves one request in a cycle: the rest of the request's last cycle is lost.
             Some(request) => next.min(((request.bytes - SLACK) / share).ceil().max(1.0)),
             None => next,
         }
     }
 
-    /// Lets `cycles` pass.
+    /// Advances the time by `cycles`.
     fn advance(&mut self, cycles: f64, share: f64) {
         self.now += cycles;
         let blocked = self.step.is_some_and(|step| self.is_blocked(&step));
@@ -263,25 +263,25 @@ impl Module {
         }
     }
 
-    /// Does what follows at once where a step or a tile has ended.
+    /// Begins the next steps and writes after the end of a step or a tile.
     fn settle<'a>(
         &mut self,
         queue: &mut impl Iterator<Item = &'a Task>,
         raster: &Rasterizer,
         report: &mut RasterReport,
     ) {
-        // Steps of no length follow at once.
+        // Steps of no length are followed at once.
         while self.is_done() {
             self.proceed(queue, raster, report);
         }
-        // A tile may end while the next batch is still on its way.
+        // A tile may end while the next batch is still being fetched.
         if self.step.is_some_and(|step| step.cycles <= 0.0) {
             let write = self.end_tile(raster, report);
             self.port.extend(write);
         }
     }
 
-    /// Goes on to the next step, or to a stretch of equal ones, if there is any.
+    /// Goes on to the next step, or to a run of equal steps, if there is any.
     fn proceed<'a>(
         &mut self,
         queue: &mut impl Iterator<Item = &'a Task>,
@@ -314,7 +314,7 @@ impl Module {
                 });
                 return;
             }
-            // A stretch, in closed form.
+            // A run of equal steps, in closed form.
             current.count = 1.0;
             let each = cycles.max(((bytes - SLACK) / self.rates.port).ceil());
             let cycles = (count - 1.0) * each;
@@ -377,7 +377,7 @@ impl Module {
         }
         let bytes = f64::from(raster.tile_bytes());
         report.bytes_out += bytes;
-        // The last pixels must leave the pipeline first.
+        // The last pixels must leave the pipeline before they are written.
         let latency = f64::from(raster.latency(mode));
         Some(Request {
             latency,
@@ -386,7 +386,7 @@ impl Module {
         })
     }
 
-    /// A tile's batches, equal ones together.
+    /// The batches of a tile, with equal ones grouped.
     fn batches(
         &mut self,
         task: &Task,
@@ -432,7 +432,7 @@ fn cycles_of(segment: &Segment, [from, to]: [u32; 2], mode: Mode, raster: &Raste
     [busy, dependency, controller]
 }
 
-/// The batches of one draw in a tile, the first of which takes `begin` cycles more.
+/// The batches of one draw in a tile. The first takes `begin` cycles more.
 fn part_batches(
     part: &Part,
     raster: &Rasterizer,
@@ -462,7 +462,7 @@ fn part_batches(
     };
     let mut cycles = begin;
     let mut filled = 0;
-    // A draw's first batch stands alone: it takes longer, and may have to wait for pixels to be written.
+    // A draw's first batch is not grouped: it takes longer, and may have to wait for pixels to be written.
     let mut alone = true;
     for segment in &part.segments {
         let mut spend = |range: [u32; 2]| {
@@ -477,7 +477,7 @@ fn part_batches(
         while at < segment.primitives {
             let left = segment.primitives - at;
             let whole = left / size;
-            // The last batch of a list may be fetched in part only.
+            // The last batch of a list may be partly filled.
             if filled == 0 && !alone && whole >= 1 && even {
                 let total = spend([at, at + whole * size]);
                 push(whole, total / f64::from(whole));

@@ -1,9 +1,8 @@
-//! What the simulated GauRast hardware would have spent: cycles, energy and area, from a trace of the work that a
-//! device did.
+//! Models of the simulated GauRast hardware: cycles, energy and area, from a trace of the work that a device did.
 //!
-//! The trace ([`work`]) is read, never changed, and knows nothing of time. [`config`] says what the hardware is like,
-//! with the source of each number. [`fast`] tells the rasterizer's cycles and [`simulate`] a frame's. What is studied with
-//! the model (the paper's numbers, sweeps, the model cycle by cycle) is the crate `timing-studies`.
+//! The trace ([`work`]) is read, never changed, and has no times. [`config`] describes the hardware, with the source of
+//! each number. [`fast`] computes the rasterizer's cycles and [`simulate`] a frame's time. Studies that use the model
+//! (the paper's numbers, sweeps, a cycle-stepped model) are the crate `timing-studies`.
 #![forbid(unsafe_code)]
 
 pub mod config;

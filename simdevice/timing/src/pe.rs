@@ -1,9 +1,9 @@
-//! Operations of a processing element: what one pixel and primitive take, GauRast, Table II. The scalar PE of the studies
-//! computes pixels with its units as methods, and its tests hold its counts against these.
+//! Operation counts of a processing element for one pixel and primitive, from GauRast's Table II. The scalar PE of
+//! `timing-studies` computes pixels with its units as methods; its tests compare its counts with these.
 
 use serde::Serialize;
 
-/// How often each unit was used.
+/// The number of uses of each unit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Operations {
     /// Additions and subtractions.
@@ -17,22 +17,23 @@ pub struct Operations {
 }
 
 impl Operations {
-    /// What a PE does for one pixel and triangle; GauRast, Table II.
+    /// The operations of a PE for one pixel and triangle; GauRast, Table II.
     pub const TRIANGLE: Self = Self {
         add: 9,
         mul: 9,
         div: 1,
         exp: 0,
     };
-    /// What a PE does for one pixel and Gaussian; GauRast, Table II: 2 adders, 1 multiplier and the exponential more.
+    /// The operations of a PE for one pixel and Gaussian; GauRast, Table II: 2 additions, 1 multiplication and the
+    /// exponential more than its triangle units have.
     pub const GAUSSIAN: Self = Self {
         add: 11,
         mul: 10,
         div: 0,
         exp: 1,
     };
-    /// Of a Gaussian's, those that only a Gaussian that is blended needs: 3 colours, and the next transmittance with
-    /// its test. Their inputs are gated otherwise.
+    /// The share of [`Self::GAUSSIAN`] that only a blended Gaussian needs: 3 colours, and the next transmittance with
+    /// its test. For other Gaussians the inputs of these units are gated.
     pub const BLEND: Self = Self {
         add: 3,
         mul: 3,

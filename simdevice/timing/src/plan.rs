@@ -1,5 +1,5 @@
-//! The order in which rasterizer modules take up a frame: tile by tile, every draw of a tile before the next tile, as
-//! the device does. Both models start from here, and share nothing else but the cost of one primitive.
+//! The order in which rasterizer modules take the tiles of a frame: every draw of a tile before the next tile, as the
+//! device does. Both models of the rasterizer use this order; apart from it they share only the cost of one primitive.
 
 use crate::config::{Config, Rasterizer};
 use crate::work::{
@@ -7,7 +7,7 @@ use crate::work::{
 };
 use std::collections::{BTreeMap, HashMap};
 
-/// What one module does without interruption: all draws of a tile.
+/// The work that one module does without interruption: all draws of a tile.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Task {
     /// Column and row of the tile, in tiles of the hardware's size.
@@ -21,11 +21,11 @@ pub struct Task {
 pub struct Part {
     /// The mode that it needs.
     pub mode: Mode,
-    /// Primitives that are evaluated, and in how many groups of 16 pixels.
+    /// The primitives that are evaluated, with their groups of 16 pixels.
     pub segments: Vec<Segment>,
-    /// Primitives that are evaluated or at least looked at.
+    /// The number of primitives that are fetched: evaluated or at least checked.
     pub needed: u32,
-    /// Primitives that the list holds beyond those.
+    /// The number of the list's primitives that are not fetched.
     pub left_over: u32,
 }
 
@@ -60,9 +60,9 @@ pub fn tasks(frame: &FrameWork, raster: &Rasterizer) -> Vec<Task> {
     tasks
 }
 
-/// A draw in a tile of the trace, as the hardware sees it.
+/// One draw in a tile of the trace, with the primitives that the hardware fetches.
 fn part(mode: Mode, tile: &TileWork, raster: &Rasterizer) -> Part {
-    // Hidden primitives are fetched in any case; a triangle that its bounding box alone brought here is no less.
+    // Hidden primitives are fetched, too, and so are triangles of which only the bounding box reaches the tile.
     let segments: Vec<_> = tile
         .segments(raster.granularity(mode), raster.hierarchical_depth)
         .collect();
@@ -75,8 +75,8 @@ fn part(mode: Mode, tile: &TileWork, raster: &Rasterizer) -> Part {
     }
 }
 
-/// The lists of a draw in tiles of another size: an estimate. Lists grow as bounding boxes say, a larger tile is
-/// finished when the last of its parts is, and what was evaluated block by block is evaluated all the same.
+/// The lists of a draw in tiles of another size: an estimate. Lists grow in the ratio of the bounding boxes' pairs; a
+/// larger tile is finished when the last of its parts is; the number of evaluations by 4x4 blocks does not change.
 fn resized(
     draw: &DrawWork,
     tiles: impl Iterator<Item = ([u32; 2], Part)>,
@@ -86,7 +86,8 @@ fn resized(
         let index = TILE_SIDES.iter().position(|&known| known == side)?;
         Some(draw.sized_pairs[index] as f64).filter(|&pairs| pairs > 0.0)
     };
-    // Where nothing is known, a primitive covers all that its tile is cut into, and no two of what is joined.
+    // Without counts, a primitive is taken to be in all pieces of a tile that is divided, and in one of the tiles that
+    // are joined.
     let unknown = f64::from(TILE_SIDE / raster.tile_side.min(TILE_SIDE)).powi(2);
     let ratio = match (pairs(raster.tile_side), pairs(TILE_SIDE)) {
         (Some(these), Some(known)) => these / known,
@@ -116,7 +117,7 @@ fn resized(
         for number in 0..pieces {
             let mut piece = piece.clone();
             for segment in &mut piece.segments {
-                // The groups of the whole are shared out among its pieces.
+                // The groups of the tile are divided among its pieces.
                 if per_pixel {
                     let (n, k) = (u64::from(pieces), u64::from(number));
                     segment.groups = (k + 1) * segment.groups / n - k * segment.groups / n;
@@ -131,8 +132,8 @@ fn resized(
     out
 }
 
-/// Lists taken together, `ratio` times as long, of primitives that take so many `groups` each unless only what they
-/// reach is evaluated.
+/// Joins lists into one that is `ratio` times as long as all of them. Each primitive takes `groups` groups, unless
+/// `per_pixel` says that it is evaluated only in groups that it reaches.
 fn join(mode: Mode, parts: &[Part], ratio: f64, groups: u64, per_pixel: bool) -> Part {
     let listed = |part: &Part| f64::from(part.needed + part.left_over);
     let longest = parts.iter().map(listed).fold(0.0, f64::max) * ratio.min(1.0);
@@ -165,20 +166,20 @@ fn join(mode: Mode, parts: &[Part], ratio: f64, groups: u64, per_pixel: bool) ->
     }
 }
 
-/// The rates that the rasterizer's clock sees.
+/// Rates in cycles of the rasterizer's clock.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rates {
     /// Bytes per cycle of one module's port.
     pub port: f64,
     /// Bytes per cycle of main memory, for all modules together.
     pub memory: f64,
-    /// Cycles from a request to its first byte, where the request could not be made ahead.
+    /// Cycles from a request to its first byte, for a request that can't be made ahead.
     pub latency: u32,
 }
 
 impl Rates {
-    /// What is left to the rasterizer while others move `others_gb_s`; at least a half of main memory is, because
-    /// its arbiter is fair.
+    /// The rates of the rasterizer while other units move `others_gb_s`. It has at least half of main memory's rate,
+    /// because the arbiter is fair.
     pub fn new(config: &Config, others_gb_s: f64) -> Self {
         let memory = &config.memory;
         let whole = memory.bandwidth_gb_s * memory.efficiency;
@@ -229,7 +230,7 @@ mod tests {
         assert!((Rates::new(&config, 10.0).memory - (alone - 10.0)).abs() < 1e-9);
     }
 
-    /// Pixels and primitives evaluated together.
+    /// Pairs of a pixel and a primitive that are evaluated.
     fn evaluations(tasks: &[Task]) -> u64 {
         let parts = tasks.iter().flat_map(|task| &task.parts);
         let segments = parts.flat_map(|part| &part.segments);

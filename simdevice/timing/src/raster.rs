@@ -1,27 +1,27 @@
-//! What rasterizing a frame took, whichever model says so.
+//! The result of rasterizing a frame, common to all models of the rasterizer.
 
 use crate::work::Mode;
 use serde::Serialize;
 
-/// Cycles of all modules together, by what their PEs did.
+/// Cycles of all modules together, by the activity of their PEs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct ModuleCycles {
-    /// PEs evaluated pixels.
+    /// The PEs evaluate pixels.
     pub busy: f64,
-    /// Waiting for a pixel's transmittance to come back out of the pipeline.
+    /// The PEs wait for a pixel's transmittance to leave the pipeline.
     pub dependency: f64,
-    /// Waiting for primitives from memory, or for the pixels of the tile before the last to be written.
+    /// The PEs wait for primitives from memory, or for the pixels of the tile before the last to be written.
     pub memory: f64,
-    /// The controller at the beginning of a tile, or looking at primitives that reach no unfinished pixel.
+    /// The controller begins a tile, or checks primitives that reach no unfinished pixel.
     pub controller: f64,
-    /// Draining and reconfiguring.
+    /// The pipeline drains and is reconfigured.
     pub mode_switch: f64,
-    /// Nothing left to do while other modules, the last write-back or the last drain end.
+    /// The module has no work left while other modules, the last write-back or the last drain end.
     pub idle: f64,
 }
 
 impl ModuleCycles {
-    /// All of them.
+    /// The sum of all activities.
     pub fn total(&self) -> f64 {
         self.busy + self.dependency + self.memory + self.controller + self.mode_switch + self.idle
     }
@@ -39,24 +39,24 @@ impl ModuleCycles {
     }
 }
 
-/// What rasterizing a frame took.
+/// The time, transfers and work of rasterizing a frame.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct RasterReport {
     /// Cycles from the first fetch to the last byte written.
     pub cycles: f64,
-    /// Where the modules' cycles went; their total is `cycles` times the modules.
+    /// The modules' cycles by activity; their total is `cycles` times the modules.
     pub modules: ModuleCycles,
     /// Bytes of primitives and lists that were fetched.
     pub bytes_in: f64,
-    /// Of those, fetched ahead of a tile's end and thrown away.
+    /// The part of `bytes_in` that was fetched ahead past a tile's end and discarded.
     pub bytes_wasted: f64,
     /// Bytes of pixels that were written.
     pub bytes_out: f64,
-    /// Pixels and Gaussians evaluated together.
+    /// Pairs of a pixel and a Gaussian that were evaluated.
     pub gaussian_evaluations: f64,
-    /// Pixels and triangles evaluated together.
+    /// Pairs of a pixel and a triangle that were evaluated.
     pub triangle_evaluations: f64,
-    /// Primitives and tiles taken together.
+    /// Pairs of a tile and a primitive that were fetched.
     pub pairs: f64,
     /// Mode switches.
     pub switches: f64,

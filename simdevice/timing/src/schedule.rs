@@ -1,15 +1,15 @@
-//! Two engines, the shader cores and the rasterizer, and frames that pass through them: dispatches, stages 1 and 2 and
-//! fragment programs on the one, stage 3 on the other. Collaborative scheduling lets the next frame's stages 1 and 2 run
-//! while a frame is rasterized; without it a frame ends before the next one begins. Without a rasterizer all stages run
-//! on the shader cores. A stage begins when the one before it has ended for the whole frame: fragments that could be
-//! shaded while their frame is still rasterized wait, which costs latency and, where frames overlap, no throughput.
+//! The schedule of frames on two engines: the shader cores run dispatches, stages 1 and 2 and fragment programs, and
+//! the rasterizer runs stage 3. Collaborative scheduling lets the next frame's stages 1 and 2 run while a frame is
+//! rasterized; without it a frame ends before the next one begins. Without a rasterizer all stages run on the shader
+//! cores. A stage begins when the one before it has ended for the whole frame. So fragments are not shaded while their
+//! frame is still rasterized, which costs latency but, if frames overlap, no throughput.
 
 use serde::Serialize;
 
 /// Milliseconds of a frame's stages.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Stages {
-    /// Dispatches, before everything else.
+    /// Dispatches, which come first.
     pub compute: f64,
     /// Stage 1.
     pub preprocess: f64,
@@ -17,18 +17,18 @@ pub struct Stages {
     pub sort: f64,
     /// Stage 3.
     pub raster: f64,
-    /// Fragment programs, of what triangles cover.
+    /// Fragment programs of triangles.
     pub shade: f64,
 }
 
 impl Stages {
-    /// One after the other.
+    /// The sum of all stages.
     pub fn total(&self) -> f64 {
         self.compute + self.preprocess + self.sort + self.raster + self.shade
     }
 }
 
-/// Who works.
+/// An engine of the schedule.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Engine {
@@ -39,7 +39,7 @@ pub enum Engine {
 }
 
 impl Engine {
-    /// How people call it.
+    /// The engine's name for readers.
     pub fn name(self) -> &'static str {
         match self {
             Self::ShaderCores => "shader cores",
@@ -51,40 +51,40 @@ impl Engine {
 /// A piece of work on the timeline.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Span {
-    /// Who works.
+    /// The engine that works.
     pub engine: Engine,
     /// The frame, from 0.
     pub frame: usize,
-    /// Which stage.
+    /// The stage's name.
     pub stage: &'static str,
-    /// When it begins, in ms.
+    /// Its begin, in ms.
     pub begin_ms: f64,
-    /// When it ends, in ms.
+    /// Its end, in ms.
     pub end_ms: f64,
 }
 
-/// How frames may overlap.
+/// The ways in which frames may overlap.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Policy {
-    /// Whether stages 1 and 2 of a frame may run beside stage 3 of an earlier one.
+    /// True if stages 1 and 2 of a frame may run at the same time as stage 3 of an earlier one.
     pub collaborative: bool,
-    /// Frames begun and not ended, at most.
+    /// The most frames that have begun and not ended.
     pub frames_in_flight: usize,
-    /// Whether there is a rasterizer for stage 3.
+    /// True if a rasterizer runs stage 3.
     pub has_rasterizer: bool,
 }
 
-/// A frame on its way through its stages.
+/// The progress of a frame through its stages.
 struct Progress {
     frame: usize,
     stages: Vec<(Engine, &'static str, f64)>,
-    /// Stages begun.
+    /// The number of stages begun.
     next: usize,
-    /// When the stage before the next one ends.
+    /// The end of the stage before the next one, in ms.
     ready: f64,
 }
 
-/// Lays frames out in time. An engine that is free takes what can begin first, of the oldest frame if several can.
+/// The timeline of frames. A free engine takes the stage that can begin first, of the oldest frame if several can.
 pub fn timeline(frames: &[Stages], policy: Policy) -> Vec<Span> {
     let in_flight = if policy.collaborative {
         policy.frames_in_flight.max(1)
@@ -95,7 +95,7 @@ pub fn timeline(frames: &[Stages], policy: Policy) -> Vec<Span> {
     let mut spans = Vec::new();
     let mut waiting = frames.iter().enumerate();
     let mut begun: Vec<Progress> = Vec::new();
-    // The ends of frames that left, by frame.
+    // The ends of the frames that have ended, by frame.
     let mut ends: Vec<f64> = vec![0.0; frames.len()];
     loop {
         while begun.len() < in_flight
@@ -113,7 +113,7 @@ pub fn timeline(frames: &[Stages], policy: Policy) -> Vec<Span> {
         };
         let begin_ms = progress.start(&free);
         let Some(&(engine, stage, length)) = progress.stages.get(progress.next) else {
-            // The frame has ended, and makes room for another.
+            // The frame has ended, so another may begin.
             let (frame, end) = (progress.frame, progress.ready);
             ends[frame] = end;
             begun.retain(|progress| progress.frame != frame);
@@ -147,7 +147,7 @@ impl Progress {
             (raster, "raster", stages.raster),
             (Engine::ShaderCores, "shade", stages.shade),
         ];
-        // Only what every frame has is shown where it takes no time.
+        // Only stages that every frame has are shown if they take no time.
         let shown = |&(_, stage, length): &(Engine, &str, f64)| {
             length > 0.0 || !matches!(stage, "compute" | "shade")
         };
@@ -159,7 +159,8 @@ impl Progress {
         }
     }
 
-    /// When the next stage can begin; a frame that has ended leaves at once.
+    /// The time at which the next stage can begin, in ms; negative infinity after the last stage, so that the frame is
+    /// removed first.
     fn start(&self, free: &[f64; 2]) -> f64 {
         match self.stages.get(self.next) {
             Some(&(engine, ..)) => self.ready.max(free[engine as usize]),
@@ -168,11 +169,11 @@ impl Progress {
     }
 }
 
-/// Frames per second that the same frame, over and over, settles at; 0 for a frame that takes no time.
+/// The frame rate at which a repeated frame settles; 0 for a frame that takes no time.
 pub fn fps(stages: Stages, policy: Policy) -> f64 {
     const WARM_UP: usize = 8;
     const MEASURED: usize = 64;
-    /// The last frames are not held up by others.
+    /// The frames after the measured ones, which are left out because nothing holds up the last frames.
     const AFTER: usize = 8;
     let spans = timeline(&[stages; WARM_UP + MEASURED + AFTER], policy);
     let end_of = |frame: usize| {
@@ -190,21 +191,21 @@ pub fn fps(stages: Stages, policy: Policy) -> f64 {
     }
 }
 
-/// A timeline in Chrome's trace event format, which Perfetto opens too: a row per engine. To be written as JSON.
+/// A timeline in Chrome's trace event format, which Perfetto also opens: a row per engine. Serialize it as JSON.
 #[derive(Clone, Debug, Serialize)]
 #[serde(rename_all = "camelCase")]
 pub struct ChromeTrace<T> {
     trace_events: Vec<Event>,
     display_time_unit: &'static str,
-    /// Whatever else a reader should know.
+    /// Further data for readers.
     other_data: T,
 }
 
-/// An event; times in microseconds.
+/// An event; times are in microseconds.
 #[derive(Clone, Debug, Serialize)]
 struct Event {
     name: String,
-    /// "M": a name of a process or thread; "X": a span.
+    /// The type: "M" for a name of a process or thread, "X" for a span.
     ph: &'static str,
     pid: u32,
     tid: u32,
@@ -224,7 +225,7 @@ enum Arguments {
     Frame(usize),
 }
 
-/// What a module is at on the timeline.
+/// A tile's time in a module, on the timeline.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModuleSpan {
     /// The module, from 0.
@@ -233,21 +234,21 @@ pub struct ModuleSpan {
     pub frame: usize,
     /// Column and row of its tile.
     pub at: [u32; 2],
-    /// When it begins, in ms.
+    /// Its begin, in ms.
     pub begin_ms: f64,
-    /// When it ends, in ms.
+    /// Its end, in ms.
     pub end_ms: f64,
 }
 
-/// The tracks of modules begin with this one.
+/// The track of the first module.
 const FIRST_MODULE: u32 = 10;
 
-/// The timeline, with `other_data` beside it.
+/// The timeline as a Chrome trace, with `other_data`.
 pub fn chrome_trace<T: Serialize>(spans: &[Span], other_data: T) -> ChromeTrace<T> {
     chrome_trace_of_modules(spans, &[], other_data)
 }
 
-/// The timeline with a row per module, too, on which each tile is a span.
+/// The timeline as a Chrome trace, with another row for each module, on which each tile is a span.
 pub fn chrome_trace_of_modules<T: Serialize>(
     spans: &[Span],
     modules: &[ModuleSpan],
@@ -346,7 +347,7 @@ mod tests {
             ..POLICY
         };
         assert!((fps(STAGES, one) - 1e3 / 42.0).abs() < 1e-9);
-        // Fragments wait for their rasterizer, and the shader cores work on the next frame meanwhile.
+        // Fragments wait for the rasterizer, and the shader cores work on the next frame meanwhile.
         let shaded = Stages {
             shade: 5.0,
             ..STAGES

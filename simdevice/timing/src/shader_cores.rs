@@ -1,14 +1,14 @@
-//! The shader cores: a roofline over the work that stages 1 and 2 (and, without a rasterizer, stage 3) execute.
+//! The shader cores: a roofline over the work of stages 1 and 2 (and, without a rasterizer, of stage 3).
 
 use crate::config::{Config, Memory, Shader};
 use crate::work::ShaderWork;
 
-/// What limits a piece of work.
+/// The two limits of a piece of work: issuing instructions and moving bytes.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Roofline {
-    /// Milliseconds of issuing instructions.
+    /// Milliseconds to issue the instructions.
     pub compute_ms: f64,
-    /// Milliseconds of moving bytes.
+    /// Milliseconds to move the bytes.
     pub memory_ms: f64,
 }
 
@@ -19,9 +19,9 @@ impl Roofline {
     }
 }
 
-/// The time of a piece of work.
+/// The roofline of a piece of work.
 pub fn roofline(work: &ShaderWork, shader: &Shader, memory: &Memory) -> Roofline {
-    // Units of different kinds work side by side, but one scheduler issues for all: float and integer share its slots.
+    // Units of different kinds work in parallel, but one scheduler issues for all: float and integer share its slots.
     let units = [
         (work.float + work.integer) / shader.float_per_cycle,
         work.integer / shader.integer_per_cycle,
@@ -39,7 +39,7 @@ pub fn roofline(work: &ShaderWork, shader: &Shader, memory: &Memory) -> Roofline
     }
 }
 
-/// Milliseconds of stage 3 on the shader cores, for so many evaluations of a primitive at a pixel.
+/// Milliseconds of stage 3 on the shader cores, for `evaluations` pairs of a pixel and a primitive.
 pub fn stage_3_ms(evaluations: f64, config: &Config) -> f64 {
     let shader = &config.shader;
     let lanes = f64::from(shader.sms) * shader.float_per_cycle * shader.clock_ghz * 1e6;

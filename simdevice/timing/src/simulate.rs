@@ -1,4 +1,4 @@
-//! One frame on one piece of hardware: every model of this crate put together.
+//! The simulation of one frame on one configuration: all models of this crate combined.
 
 use crate::config::{Config, Lists};
 use crate::energy::{self, Changed, Energy};
@@ -10,66 +10,67 @@ use crate::work::{FrameWork, Mode, Saturation};
 use serde::Serialize;
 use std::borrow::Cow;
 
-/// What a frame took, and what it would have taken without the rasterizer.
+/// The time and energy of a frame, with the rasterizer and without it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Simulation {
-    /// The rasterizer's cycles as frames overlap in this configuration; zero if there is none.
+    /// The rasterizer's cycles, with the overlap of frames that the configuration allows; zero if there is no
+    /// rasterizer.
     pub raster: RasterReport,
-    /// The same for one frame at a time: what performance queries and simulated timestamps count.
+    /// The rasterizer's cycles if frames don't overlap: the values of performance queries and simulated timestamps.
     pub raster_alone: RasterReport,
     /// The share of Gaussians' evaluations that changed a pixel.
     pub blended: f64,
     /// The share of triangles' evaluations that covered a pixel and passed the early tests.
     pub covered: f64,
-    /// Dispatches.
+    /// Time of dispatches.
     pub compute: Roofline,
-    /// Stage 1.
+    /// Time of stage 1.
     pub preprocess: Roofline,
-    /// Stage 2.
+    /// Time of stage 2.
     pub sort: Roofline,
-    /// Fragment programs.
+    /// Time of fragment programs.
     pub shade: Roofline,
-    /// Milliseconds of the stages as frames overlap in this configuration.
+    /// Milliseconds of the stages, with the overlap of frames that the configuration allows.
     pub stages: Stages,
-    /// The same for one frame at a time.
+    /// Milliseconds of the stages if frames don't overlap.
     pub stages_alone: Stages,
-    /// GB/s that the shader cores take from the rasterizer while both run.
+    /// GB/s that the shader cores use while the rasterizer runs.
     pub contention_gb_s: f64,
-    /// Frames per second as configured.
+    /// Frames per second with the overlap that the configuration allows.
     pub fps: f64,
     /// Frames per second if frames overlap.
     pub fps_collaborative: f64,
     /// Frames per second if they don't.
     pub fps_serial: f64,
-    /// Stage 3 without Gaussians in the rasterizer, in ms: Gaussians on the shader cores, triangles as before.
+    /// Milliseconds of stage 3 if the shader cores draw the Gaussians, and the rasterizer only triangles.
     pub baseline_raster_ms: f64,
-    /// Frames per second without a rasterizer.
+    /// Frames per second without a rasterizer for Gaussians.
     pub baseline_fps: f64,
-    /// Stage 3 against the baseline's.
+    /// The speed-up of stage 3 over the baseline.
     pub raster_speedup: f64,
     /// The factors of `raster_speedup`.
     pub gains: Gains,
-    /// Frames per second against the baseline's.
+    /// The speed-up of frames per second over the baseline.
     pub speedup: f64,
     /// Millijoules of a frame.
     pub energy: Energy,
-    /// Millijoules of a frame without a rasterizer.
+    /// Millijoules of a frame without a rasterizer for Gaussians.
     pub baseline_mj: f64,
 }
 
-/// Factors of the raster stage's speed-up over the baseline, whose product it is.
+/// The factors of the raster stage's speed-up over the baseline. Their product is the speed-up.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Gains {
-    /// The hardware on the rasterizer's lists, if its PEs never waited.
+    /// The gain of the hardware on the rasterizer's lists, if its PEs never waited.
     pub hardware: f64,
-    /// The rasterizer's lists instead of the baseline's, both on shader cores.
+    /// The gain of the rasterizer's lists over the baseline's, both on shader cores.
     pub lists: f64,
-    /// Time in which PEs work over the time that they take: at most 1.
+    /// The time in which PEs evaluate over all their time: at most 1.
     pub stalls: f64,
 }
 
 impl Gains {
-    /// No gains at all.
+    /// No gain and no speed-up.
     const NONE: Self = Self {
         hardware: 1.0,
         lists: 1.0,
@@ -77,8 +78,7 @@ impl Gains {
     };
 }
 
-/// Evaluations that stage 3 makes on shader cores, whose original code ends a tile's list when all its pixels are
-/// finished.
+/// The evaluations of stage 3 on shader cores. The original code ends a tile's list when all its pixels are finished.
 pub fn baseline_evaluations(frame: &FrameWork) -> f64 {
     let gaussians = |draw: &&crate::work::DrawWork| draw.mode == Mode::Gaussian;
     let evaluations = |draw: &crate::work::DrawWork| draw.evaluations(Saturation::Tile, false);
@@ -86,12 +86,12 @@ pub fn baseline_evaluations(frame: &FrameWork) -> f64 {
     draws.map(evaluations).sum::<u64>() as f64
 }
 
-/// Milliseconds of stage 3 where shader cores draw Gaussians from a frame's lists.
+/// Milliseconds of stage 3 if shader cores draw the Gaussians of a frame's lists.
 fn baseline_raster_ms(frame: &FrameWork, config: &Config) -> f64 {
     shader_cores::stage_3_ms(baseline_evaluations(frame), config) + triangles_ms(frame, config)
 }
 
-/// The frame with the lists that are asked for.
+/// The frame with lists of a kind.
 fn listed(frame: &FrameWork, lists: Lists) -> Cow<'_, FrameWork> {
     match lists {
         Lists::Exact => Cow::Borrowed(frame),
@@ -99,7 +99,8 @@ fn listed(frame: &FrameWork, lists: Lists) -> Cow<'_, FrameWork> {
     }
 }
 
-/// The frame as the configuration's stage 3 takes it, in the rasterizer or, where there is none, on shader cores.
+/// The frame with the lists that the configuration's stage 3 uses: the rasterizer's or, if it has no modules, the
+/// baseline's.
 pub fn of_rasterizer<'a>(frame: &'a FrameWork, config: &Config) -> Cow<'a, FrameWork> {
     let lists = match config.rasterizer.modules {
         0 => config.baseline.lists,
@@ -108,8 +109,8 @@ pub fn of_rasterizer<'a>(frame: &'a FrameWork, config: &Config) -> Cow<'a, Frame
     listed(frame, lists)
 }
 
-/// Milliseconds of the frame's triangles in a rasterizer for triangles alone, which every GPU has: this one or, where
-/// there is none for Gaussians, the paper's, since the published numbers tell nothing of it.
+/// Milliseconds of the frame's triangles in a rasterizer for triangles, which every GPU has: this one's modules or, if
+/// there are none, as many as the paper's, because nothing is published about the GPU's own.
 fn triangles_ms(frame: &FrameWork, config: &Config) -> f64 {
     if frame.draws.iter().all(|draw| draw.mode == Mode::Gaussian) {
         return 0.0;
@@ -122,10 +123,10 @@ fn triangles_ms(frame: &FrameWork, config: &Config) -> f64 {
     fast::rasterize(&triangles, &config, 0.0).milliseconds(config.rasterizer.clock_ghz)
 }
 
-/// Modules of the rasterizer that a machine without GauRast has for triangles: as many as the paper's.
+/// The number of modules of the triangle rasterizer of a GPU without GauRast: the paper's.
 const TRIANGLE_MODULES: u32 = 15;
 
-/// What runs on shader cores, of which a frame in flight's rasterizer takes bytes away.
+/// The times of the work on shader cores, while a rasterizer moves `rasters_bytes` for another frame.
 fn on_shader_cores(frame: &FrameWork, config: &Config, rasters_bytes: f64) -> [Roofline; 4] {
     let stages = frame.shader();
     let bytes: f64 = stages.iter().map(|stage| stage.bytes).sum();
@@ -137,12 +138,12 @@ fn on_shader_cores(frame: &FrameWork, config: &Config, rasters_bytes: f64) -> [R
     })
 }
 
-/// Milliseconds of all that runs on shader cores.
+/// Milliseconds of all work on shader cores.
 fn milliseconds(before: &[Roofline; 4]) -> f64 {
     before.iter().map(Roofline::milliseconds).sum()
 }
 
-/// Frames one at a time, and frames that overlap.
+/// The times of the stages of a frame, for frames one at a time or for frames that overlap.
 struct Both {
     shader: [Roofline; 4],
     raster: RasterReport,
@@ -163,7 +164,7 @@ impl Both {
     }
 }
 
-/// The stages where nothing else runs.
+/// The times of the stages if frames don't overlap.
 fn serial(frame: &FrameWork, config: &Config, baseline_raster_ms: f64) -> Both {
     let has_rasterizer = config.rasterizer.modules > 0;
     let mut raster = RasterReport::default();
@@ -180,7 +181,7 @@ fn serial(frame: &FrameWork, config: &Config, baseline_raster_ms: f64) -> Both {
     }
 }
 
-/// The stages where a frame's work for shader cores runs beside another's stage 3: both move their bytes through one memory.
+/// The times if a frame's work on shader cores overlaps stage 3 of another frame: both move bytes through one memory.
 fn collaborative(frame: &FrameWork, config: &Config, alone: &Both) -> Both {
     let moved = alone.raster.bytes_in + alone.raster.bytes_out;
     let shader = on_shader_cores(frame, config, moved);
@@ -291,7 +292,7 @@ pub fn simulate(frame: &FrameWork, config: &Config) -> Simulation {
     }
 }
 
-/// How the configuration lets frames overlap.
+/// The overlap of frames that the configuration allows.
 pub fn policy(config: &Config) -> Policy {
     Policy {
         collaborative: config.schedule.collaborative,
@@ -300,7 +301,7 @@ pub fn policy(config: &Config) -> Policy {
     }
 }
 
-/// Frames one after the other on the timeline.
+/// The timeline of frames.
 pub fn timeline(frames: &[Simulation], config: &Config) -> Vec<Span> {
     let stages: Vec<_> = frames.iter().map(|frame| frame.stages).collect();
     schedule::timeline(&stages, policy(config))
@@ -330,7 +331,7 @@ fn changed(frame: &FrameWork, config: &Config) -> Changed {
     }
 }
 
-/// A frame of Gaussians spread evenly over the tiles of an image, none of which finishes.
+/// A frame of Gaussians that are spread evenly over the tiles of an image, in which no pixel finishes.
 pub fn even_frame(size: [u32; 2], pairs: u64, contributions: f64) -> FrameWork {
     let [columns, rows] = size.map(|side| side.div_ceil(crate::work::TILE_SIDE));
     let tiles = u64::from(columns) * u64::from(rows);
@@ -397,7 +398,7 @@ mod tests {
         }
         assert!((exact.gains.lists - 3.0).abs() < 0.01);
         assert_eq!(squares.gains.lists, 1.0);
-        // Both baselines sort and evaluate what squares give.
+        // Both baselines sort and evaluate the pairs of squares.
         assert!((exact.baseline_fps - squares.baseline_fps).abs() < 1e-9);
         assert!((squares.sort.memory_ms / exact.sort.memory_ms - 3.0).abs() < 0.6);
         let baseline = with("orin-nx-10w");
@@ -470,7 +471,7 @@ mod tests {
 
     #[test]
     fn overlapping_frames_share_memory() {
-        // Stages 1 and 2 limited by memory alone: a frame takes as long as all its bytes.
+        // Memory alone limits stages 1 and 2: a frame takes as long as all its bytes.
         let mut frame = frame();
         let [draw] = frame.draws.as_mut_slice() else {
             panic!("one draw")

@@ -1,10 +1,10 @@
-//! What stages 1 and 2 of a Gaussian draw ask of shader cores: operations per Gaussian and per pair, counted from the
-//! steps of the usual implementation (3DGS's CUDA code: one thread per Gaussian, a radix sort of 64-bit keys). They are
-//! counts of this project's own making, not the paper's, which gives no times of stages 1 and 2.
+//! The work of stages 1 and 2 of a Gaussian draw on shader cores: operations per Gaussian and per pair, counted from
+//! the steps of the usual implementation (3DGS's CUDA code: one thread per Gaussian, a radix sort of 64-bit keys). The
+//! counts are this project's; the paper gives no times of stages 1 and 2.
 
 use crate::work::ShaderWork;
 
-/// Every Gaussian that is read: to camera space and the near plane's test. 12 bytes of position.
+/// Work for every Gaussian that is read: the transform to camera space and the near plane's test. 12 bytes of position.
 const CULL: ShaderWork = ShaderWork {
     float: 16.0,
     integer: 8.0,
@@ -16,8 +16,9 @@ const CULL: ShaderWork = ShaderWork {
     bytes: 12.0,
 };
 
-/// Every Gaussian that passes: normalised quaternion and rotation (34), J W R S (60), its product with its transpose (18),
-/// determinant, conic, radius and rectangle (40); 32 bytes of scale, rotation and opacity in, 48 bytes out.
+/// Work for every Gaussian that passes: normalised quaternion and rotation (34), J W R S (60), its product with its
+/// transpose (18), determinant, conic, radius and rectangle (40); reads 32 bytes of scale, rotation and opacity, writes
+/// 48.
 const PROJECT: ShaderWork = ShaderWork {
     float: 152.0,
     integer: 20.0,
@@ -29,8 +30,8 @@ const PROJECT: ShaderWork = ShaderWork {
     bytes: 80.0,
 };
 
-/// Every Gaussian that a vertex program projected and that passes: of projection only determinant, conic, radius and
-/// rectangle; 48 bytes out.
+/// Work for every Gaussian that a vertex program projected and that passes: only determinant, conic, radius and
+/// rectangle; writes 48 bytes.
 const FOOTPRINT: ShaderWork = ShaderWork {
     float: 40.0,
     integer: 20.0,
@@ -42,7 +43,7 @@ const FOOTPRINT: ShaderWork = ShaderWork {
     bytes: 48.0,
 };
 
-/// Every Gaussian that is drawn: the direction and the basis.
+/// Work for every Gaussian that is drawn: the view direction and the spherical harmonics basis.
 const DIRECTION: ShaderWork = ShaderWork {
     float: 45.0,
     integer: 4.0,
@@ -54,7 +55,7 @@ const DIRECTION: ShaderWork = ShaderWork {
     bytes: 0.0,
 };
 
-/// Every spherical harmonics coefficient of three colours.
+/// Work for every spherical harmonics coefficient of three colours.
 const COEFFICIENT: ShaderWork = ShaderWork {
     float: 3.0,
     integer: 0.0,
@@ -66,7 +67,7 @@ const COEFFICIENT: ShaderWork = ShaderWork {
     bytes: 12.0,
 };
 
-/// Every pair: its key and value, 12 bytes; finding the tiles' ranges reads the key again.
+/// Work for every pair: its key and value, 12 bytes; finding the tiles' ranges reads the key again.
 const EMIT: ShaderWork = ShaderWork {
     float: 0.0,
     integer: 14.0,
@@ -78,7 +79,7 @@ const EMIT: ShaderWork = ShaderWork {
     bytes: 20.0,
 };
 
-/// Every pair and pass of the sort: 12 bytes in and out.
+/// Work for every pair and pass of the sort: reads and writes 12 bytes.
 const SORT_PASS: ShaderWork = ShaderWork {
     float: 0.0,
     integer: 24.0,
@@ -90,20 +91,20 @@ const SORT_PASS: ShaderWork = ShaderWork {
     bytes: 24.0,
 };
 
-/// Bits of a key that a pass sorts by.
+/// Bits of the key that a pass sorts by.
 const DIGIT_BITS: u32 = 8;
 
-/// What a draw of Gaussians hands to its stages 1 and 2.
+/// The counts of a draw of Gaussians that decide the work of its stages 1 and 2.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct GaussianCounts {
     /// Gaussians that the draw named and the device projects.
     pub read: u64,
-    /// Of those, beyond the near plane and not faint.
+    /// The Gaussians of `read` that are beyond the near plane and not too faint.
     pub projected: u64,
-    /// Of those, that reach a tile.
+    /// The Gaussians of `projected` that reach a tile.
     pub drawn: u64,
-    /// Gaussians that a vertex program projected, beyond the near plane and not faint. What the program did is not among
-    /// what follows from these counts.
+    /// Gaussians that a vertex program projected and that are beyond the near plane and not too faint. The work of the
+    /// program itself is not derived from these counts.
     pub shaded: u64,
     /// Degree of the spherical harmonics.
     pub degree: u32,
@@ -113,7 +114,7 @@ pub struct GaussianCounts {
     pub tiles: u64,
 }
 
-/// Stages 1 and 2 of a draw.
+/// The work of stages 1 and 2 of a draw.
 pub fn gaussian(counts: &GaussianCounts) -> [ShaderWork; 2] {
     let coefficients = f64::from((counts.degree + 1).pow(2));
     let preprocess = CULL
@@ -125,7 +126,7 @@ pub fn gaussian(counts: &GaussianCounts) -> [ShaderWork; 2] {
                 .plus(&COEFFICIENT.times(coefficients))
                 .times(counts.drawn as f64),
         );
-    // 32 bits of depth below the tile's number.
+    // 32 bits of depth in the key below the tile's number.
     let bits = 32 + u64::BITS - counts.tiles.saturating_sub(1).leading_zeros();
     let passes = f64::from(bits.div_ceil(DIGIT_BITS));
     let sort = EMIT

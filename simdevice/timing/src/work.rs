@@ -1,9 +1,9 @@
-//! The trace of work: what a device did for a frame, in the units that cost hardware something. It tells nothing of
-//! time; every model in this crate reads it and none changes it.
+//! The trace of work: the work of a device for a frame, in the units that hardware spends time and energy on. It does
+//! not say how long the work takes; every model in this crate reads it and none changes it.
 
 use serde::{Deserialize, Serialize};
 
-/// Pixels along a side of the tiles that a trace tells of, and parallel rows (or 4x4 blocks) of one.
+/// The side in pixels of a trace's tiles, and the number of rows (or 4x4 blocks) of one.
 pub const TILE_SIDE: u32 = 16;
 /// Pixels of such a tile.
 pub const TILE_PIXELS: u32 = TILE_SIDE * TILE_SIDE;
@@ -11,60 +11,59 @@ pub const TILE_PIXELS: u32 = TILE_SIDE * TILE_SIDE;
 pub const TILE_GROUPS: u32 = 16;
 /// The version of [`Trace`]'s layout.
 pub const TRACE_VERSION: u32 = 3;
-/// Sides of the tiles that [`DrawWork::sized_pairs`] tells of, in pixels.
+/// The sides in pixels of the tiles that [`DrawWork::sized_pairs`] counts.
 pub const TILE_SIDES: [u32; 4] = [8, 16, 32, 64];
 
-/// What a program did, as a list of frames.
+/// The work of a program, as a list of frames.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Trace {
-    /// [`TRACE_VERSION`].
+    /// The layout's version, [`TRACE_VERSION`].
     pub version: u32,
     /// Frames, oldest first: render passes that drew something, with the dispatches before them. Dispatches after the
     /// last pass are a frame without draws.
     pub frames: Vec<FrameWork>,
 }
 
-/// Most pairs of a tile and a primitive, and most tiles of a draw, that a frame of a trace may have: 19 times what the
-/// paper's largest scene needs.
+/// The most pairs of a tile and a primitive, and the most tiles of a draw, in a frame of a trace: 19 times as many as
+/// the paper's largest scene has.
 pub const MAX_PAIRS: u64 = 1 << 28;
 
-/// Why a trace is none of a device's.
+/// The reason that a trace can't be one of a device.
 #[derive(Debug, PartialEq, thiserror::Error)]
 pub enum TraceError {
-    /// A layout of another version.
+    /// The layout has another version.
     #[error("a trace of version {0}, not {TRACE_VERSION}")]
     Version(u32),
-    /// More than can be simulated in reasonable time.
+    /// The frame has more pairs than can be simulated in reasonable time.
     #[error(
         "frame {frame} has {pairs} pairs of a tile and a primitive; it must be at most {MAX_PAIRS}"
     )]
     TooLarge {
-        /// From 0.
+        /// The frame, from 0.
         frame: usize,
-        /// What it has.
+        /// Its pairs.
         pairs: u64,
     },
     /// A tile's numbers contradict each other.
     #[error("frame {frame}, tile {at:?}: {what}")]
     Tile {
-        /// From 0.
+        /// The frame, from 0.
         frame: usize,
-        /// Column and row.
+        /// Column and row of the tile.
         at: [u32; 2],
         /// The contradiction.
         what: &'static str,
     },
-    /// Work of shader cores that is negative or no number.
+    /// The frame's shader work has a count that is negative or not a number.
     #[error("frame {0}: work of shader cores is negative or no number")]
     ShaderWork(usize),
 }
 
 impl Trace {
-    /// Checks a trace that comes from elsewhere.
+    /// Checks a trace read from a file.
     ///
-    /// # Errors
-    /// [`TraceError`] says what is wrong with it.
+    /// # Errors Returns a [`TraceError`] that names the first problem.
     pub fn check(&self) -> Result<(), TraceError> {
         if self.version != TRACE_VERSION {
             return Err(TraceError::Version(self.version));
@@ -102,19 +101,19 @@ impl FrameWork {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FrameWork {
-    /// Width and height of what is rendered to, in pixels.
+    /// Width and height of the render target, in pixels.
     pub size: [u32; 2],
-    /// What compute programs did since the pass before, all dispatches together.
+    /// The work of compute programs since the pass before, all dispatches together.
     #[serde(default)]
     pub compute: ShaderWork,
-    /// How many dispatches they were.
+    /// The number of these dispatches.
     #[serde(default)]
     pub dispatches: u64,
     /// Draws in submission order.
     pub draws: Vec<DrawWork>,
 }
 
-/// What the rasterizer is configured for.
+/// The mode of the rasterizer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Mode {
@@ -135,25 +134,25 @@ pub struct DrawWork {
     pub primitives: u64,
     /// Primitives that reached at least one tile.
     pub drawn: u64,
-    /// Pairs of a tile and a Gaussian that the square around its 3-sigma circle gives (what the original 3DGS code
-    /// bins); 0 where that is unknown.
+    /// Pairs of a tile and a Gaussian if each Gaussian is listed in all tiles that the square around its 3-sigma circle
+    /// touches, as in the original 3DGS code; 0 if unknown.
     pub boxed_pairs: u64,
-    /// Pairs of a tile and a primitive whose bounding box touches it, for tiles of each of [`TILE_SIDES`]; 0 where that
-    /// is unknown. Only their ratios mean something, for lists are made by exact tests.
+    /// Pairs of a tile and a primitive whose bounding box touches it, for tiles of each of [`TILE_SIDES`]; 0 if
+    /// unknown. Only their ratios are used, because lists are made by exact tests.
     #[serde(default)]
     pub sized_pairs: [u64; TILE_SIDES.len()],
     /// Stage 1, preprocessing: projection, spherical harmonics or vertex programs.
     pub preprocess: ShaderWork,
     /// Stage 2: making tile lists, of Gaussians in depth order.
     pub sort: ShaderWork,
-    /// What follows rasterization: fragment programs.
+    /// The work after rasterization: fragment programs.
     #[serde(default)]
     pub shade: ShaderWork,
     /// Tiles whose list is not empty, in the order in which they are dispatched.
     pub tiles: Vec<TileWork>,
 }
 
-/// What shader cores execute and move: counts of operations of single lanes.
+/// The work of shader cores: operations, counted by single lanes, and bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ShaderWork {
@@ -169,7 +168,7 @@ pub struct ShaderWork {
     pub memory: f64,
     /// Texture samples, image reads and writes.
     pub image: f64,
-    /// Moves, conversions, control flow and exchanges between lanes, which cost issue slots alone.
+    /// Moves, conversions, control flow and exchanges between lanes, which take only issue slots.
     pub other: f64,
     /// Bytes moved to and from main memory.
     pub bytes: f64,
@@ -191,7 +190,7 @@ impl ShaderWork {
         counts.iter().all(|count| (0.0..1e18).contains(count))
     }
 
-    /// Both together.
+    /// The sum of two.
     pub fn plus(&self, other: &Self) -> Self {
         Self {
             float: self.float + other.float,
@@ -205,7 +204,7 @@ impl ShaderWork {
         }
     }
 
-    /// The work, `factor` times.
+    /// The work times `factor`.
     pub fn times(&self, factor: f64) -> Self {
         Self {
             float: self.float * factor,
@@ -233,26 +232,26 @@ pub struct TileWork {
     pub at: [u32; 2],
     /// Primitives in the tile's list.
     pub listed: u32,
-    /// The list from its front, cut where the number of unfinished pixels changes. What no run covers was not
-    /// fetched, because the tile was finished.
+    /// The list from its front, cut where the number of unfinished pixels changes. Primitives after the last run were
+    /// not fetched, because the tile was finished.
     pub runs: Vec<Run>,
     /// Pairs of a pixel and a primitive that changed the pixel.
     pub contributions: u64,
     /// Pixels that were finished before the list's end.
     pub terminated: u32,
-    /// Primitives at the end of the last run that all depths of the tile hide, in a list whose depths only grow or only
-    /// shrink: hierarchical depth ends the list before them.
+    /// Primitives at the end of the last run that all depths of the tile hide, if the list's depths only grow or only
+    /// shrink. Hierarchical depth ends the list before them.
     #[serde(default)]
     pub hidden_rest: u32,
     /// Quads of 2x2 pixels that went to fragment programs.
     #[serde(default)]
     pub quads: u32,
-    /// Quads that were covered, and of which early tests left nothing. Those of hidden primitives are not counted.
+    /// Quads that were covered but failed early tests in every pixel. Quads of hidden primitives are not counted.
     #[serde(default)]
     pub killed: u32,
 }
 
-/// Consecutive primitives of a tile's list between two changes of what is finished.
+/// Consecutive primitives of a tile's list, between two changes of the number of unfinished pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Run {
@@ -265,17 +264,17 @@ pub struct Run {
     /// Pairs of a primitive and an unfinished 4x4 block that it reaches, summed over the primitives; without
     /// `hidden_blocks`.
     pub reached: u32,
-    /// Of the primitives, those that all of the tile's depths hide.
+    /// The number of primitives that all of the tile's depths hide.
     #[serde(default)]
     pub hidden: u32,
-    /// Pairs of a primitive and an unfinished 4x4 block that it reaches, where all of the block's depths hide it: of
-    /// triangles those that the whole tile hides, of Gaussians all of them.
+    /// Pairs of a primitive and an unfinished 4x4 block that it reaches, if all of the block's depths hide it. For
+    /// triangles, only those that the whole tile hides are counted; for Gaussians, all.
     #[serde(default)]
     pub hidden_blocks: u32,
 }
 
 impl Run {
-    /// Groups of 16 pixels that hardware evaluates, which saturates like this and has a hierarchy of depths or not.
+    /// Groups of 16 pixels that hardware of this saturation, with or without hierarchical depth, evaluates.
     fn groups(&self, saturation: Saturation, hierarchical_depth: bool) -> u64 {
         let evaluated = if hierarchical_depth {
             self.primitives.saturating_sub(self.hidden)
@@ -294,7 +293,7 @@ impl Run {
         u64::from(evaluated) * u64::from(open)
     }
 
-    /// Groups of 16 pixels that are open to a primitive.
+    /// Groups of 16 pixels in which hardware of this saturation may evaluate a primitive.
     fn open(&self, saturation: Saturation) -> u64 {
         match saturation {
             Saturation::None | Saturation::Tile => TILE_GROUPS.into(),
@@ -303,7 +302,7 @@ impl Run {
         }
     }
 
-    /// The run without so many hidden primitives at its end.
+    /// The run without its last `rest` primitives, which are hidden.
     fn without(&self, rest: u32) -> Self {
         Self {
             primitives: self.primitives.saturating_sub(rest),
@@ -313,20 +312,20 @@ impl Run {
     }
 }
 
-/// Which pixels are spared a primitive once they are finished.
+/// The granularity at which finished pixels are skipped.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Saturation {
-    /// None: every primitive of the list is evaluated at every pixel.
+    /// Nothing is skipped: every primitive of the list is evaluated at every pixel.
     None,
     /// The tile's list ends once all its pixels are finished.
     #[default]
     Tile,
-    /// Rows of 16 pixels, too.
+    /// Also, finished rows of 16 pixels are skipped.
     Row,
-    /// Blocks of 4x4 pixels, too.
+    /// Also, finished blocks of 4x4 pixels are skipped.
     Block,
-    /// Blocks of 4x4 pixels, and a primitive is evaluated only in blocks that it reaches.
+    /// Finished blocks of 4x4 pixels are skipped, and a primitive is evaluated only in blocks that it reaches.
     Reached,
 }
 
@@ -359,7 +358,7 @@ impl TileWork {
         }
     }
 
-    /// What of its numbers cannot be, if anything.
+    /// The contradiction between the tile's numbers, if there is one.
     fn contradiction(&self) -> Option<&'static str> {
         let sum = |of: fn(&Run) -> u32| self.runs.iter().map(|run| u64::from(of(run))).sum::<u64>();
         let groups = |run: &Run| u64::from(run.primitives) * u64::from(TILE_GROUPS);
@@ -379,7 +378,8 @@ impl TileWork {
         None
     }
 
-    /// Primitives that the tile's unfinished pixels needed, or would have if depths had not hidden them.
+    /// Primitives before the end of the last run: those that an unfinished pixel needs, or would need without depth
+    /// tests.
     pub fn needed(&self) -> u32 {
         self.runs.iter().map(|run| run.primitives).sum()
     }
@@ -394,8 +394,8 @@ impl TileWork {
         self.runs.iter().map(|run| run.hidden_blocks).sum()
     }
 
-    /// The list as hardware that saturates like this, and has a hierarchy of depths or not, sees it: how many primitives
-    /// it fetches, and how many groups of 16 pixels they are evaluated in together. In order.
+    /// The parts of the list that hardware of this saturation, with or without hierarchical depth, fetches, in order.
+    /// Each has its primitives and the groups of 16 pixels in which they are evaluated.
     pub fn segments(
         &self,
         saturation: Saturation,
@@ -429,7 +429,7 @@ impl TileWork {
         runs.chain([rest]).filter(|segment| segment.primitives > 0)
     }
 
-    /// Pairs of a pixel and a primitive that such hardware evaluates.
+    /// Pairs of a pixel and a primitive that such hardware evaluates; see [`Self::segments`].
     pub fn evaluations(&self, saturation: Saturation, hierarchical_depth: bool) -> u64 {
         self.segments(saturation, hierarchical_depth)
             .map(|segment| segment.groups * u64::from(TILE_PIXELS / TILE_GROUPS))
@@ -437,14 +437,14 @@ impl TileWork {
     }
 }
 
-/// Consecutive primitives that cost alike.
+/// Consecutive primitives of the same cost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Segment {
     /// Primitives.
     pub primitives: u32,
     /// Groups of 16 pixels that they are evaluated in, summed over the primitives.
     pub groups: u64,
-    /// Groups of 16 pixels among which those of each primitive are.
+    /// Groups of 16 pixels in which each of them may be evaluated.
     pub open: u64,
 }
 
@@ -474,7 +474,7 @@ impl FrameWork {
         self.draws.iter().map(DrawWork::pairs).sum()
     }
 
-    /// What shader cores do: dispatches, stages 1 and 2 of all draws, and what follows rasterization.
+    /// The work of the shader cores: dispatches, stages 1 and 2 of all draws, and fragment programs.
     pub fn shader(&self) -> [ShaderWork; 4] {
         let zero = ShaderWork::default();
         self.draws.iter().fold(
@@ -490,8 +490,8 @@ impl FrameWork {
         )
     }
 
-    /// The frame with as many pairs as 3-sigma squares give, sorted as many. Which tiles they are in is not known: every
-    /// list is lengthened alike, so what comes of it is an estimate.
+    /// The frame with as many pairs as 3-sigma squares give, and the sorting work for them. The trace does not say in
+    /// which tiles they are: every list grows by the same factor, so the result is an estimate.
     pub fn with_squares(&self) -> Self {
         let mut frame = self.clone();
         for draw in &mut frame.draws {
@@ -515,7 +515,7 @@ impl FrameWork {
         frame
     }
 
-    /// The frame with the draws of one mode only, and no dispatches.
+    /// The frame with only the draws of one mode, and without dispatches.
     pub fn of_mode(&self, mode: Mode) -> Self {
         let draws = self.draws.iter().filter(|draw| draw.mode == mode);
         Self {
@@ -575,7 +575,8 @@ mod tests {
     #[test]
     fn hierarchical_depth_spares_what_is_hidden() {
         let mut tile = tile();
-        // Of the last run's four, one is hidden, two more are behind everything, and a block hides the fourth.
+        // Of the last run's four primitives, the tile hides one, two more are behind everything, and a block hides the
+        // fourth.
         tile.runs[1] = Run {
             hidden: 3,
             hidden_blocks: 6,
@@ -587,7 +588,7 @@ mod tests {
             Saturation::ALL.map(|saturation| tile.evaluations(saturation, hierarchical) / 16)
         };
         assert_eq!(groups(false), [160, 112, 84, 76, 28]);
-        // Without saturation the list is fetched to its end, and what nobody looked at is evaluated.
+        // Without saturation the list is fetched to its end, and primitives beyond the runs are evaluated, too.
         assert_eq!(groups(true), [112, 64, 57, 55, 22]);
         let fetched = |saturation, hierarchical| -> u32 {
             let segments = tile.segments(saturation, hierarchical);
