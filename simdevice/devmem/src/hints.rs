@@ -1,19 +1,17 @@
-//! Hints to the host and to the processor: large pages, and lines of caches. They change nothing but time.
+//! Hints to the host and to the processor: huge pages and prefetches. They change only the time that accesses take.
 
-/// Ranges from this many bytes on have huge pages, where the host has some: they are backed in fewer steps, and what is read
-/// all over a large one would look up a page's address nearly each time else. Of smaller ones too much would be backed that is
-/// never used.
+/// The least size of a range for which huge pages are requested. With them a range is backed in fewer steps, and
+/// scattered reads of it miss the TLB less often. In smaller ranges too many pages would be backed that are never used.
 #[cfg(target_os = "linux")]
 const LEAST_HUGE: usize = 8 << 20;
 
-/// What the host may back at once on all common processors.
+/// The size of a huge page on all common processors, in bytes.
 #[cfg(target_os = "linux")]
 const HUGE_PAGE: usize = 2 << 20;
 
-/// Asks for huge pages in as much of a range as they fit into, if that is large. It changes nothing but time.
+/// Requests huge pages for the part of a large range that they fit into. It changes only the time that accesses take.
 ///
-/// # Safety
-/// The `len` bytes from `start` on are one allocation of the caller's.
+/// # Safety The `len` bytes from `start` on must belong to one allocation of the caller.
 pub(crate) unsafe fn prefer_huge(start: *mut u8, len: usize) {
     #[cfg(target_os = "linux")]
     if len >= LEAST_HUGE {
@@ -21,25 +19,25 @@ pub(crate) unsafe fn prefer_huge(start: *mut u8, len: usize) {
         let before = start.addr().wrapping_neg() % HUGE_PAGE;
         let whole = (len - before) / HUGE_PAGE * HUGE_PAGE;
         let first = start.wrapping_add(before);
-        // SAFETY: the pages are the caller's; with which size they are backed nothing depends on. A host that has no huge pages
-        // says so, and all is as it was.
+        // SAFETY: the pages are the caller's, and nothing depends on the size of the pages that back them. A host
+        // without huge pages returns an error, which changes nothing.
         let _ = unsafe { madvise(first.cast(), whole, Advice::LinuxHugepage) };
     }
     #[cfg(not(target_os = "linux"))]
     let _ = (start, len);
 }
 
-/// Bytes that caches hold together.
+/// The size of a cache line in bytes.
 #[cfg(target_arch = "x86_64")]
 const CACHE_LINE: usize = 64;
 
-/// Has items on their way to the caches, where the processor can be told so. It changes nothing but time.
+/// Prefetches items into the caches, if the processor can. It changes only the time that accesses take.
 #[inline(always)]
 pub fn prefetch<T>(items: &[T]) {
     prefetch_bytes(items.as_ptr().cast(), size_of_val(items));
 }
 
-/// As [`prefetch`], of `size` bytes from `start` on, which nobody needs to be able to read.
+/// Prefetches `size` bytes from `start` on, as [`prefetch`] does. They need not be readable.
 #[inline(always)]
 pub(crate) fn prefetch_bytes(start: *const u8, size: usize) {
     #[cfg(target_arch = "x86_64")]

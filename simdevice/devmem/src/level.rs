@@ -2,12 +2,12 @@
 
 use fearless_simd::{Level, Simd};
 
-/// A SIMD level by name. All levels give images within the same bound of the exact one.
+/// A SIMD level by name. Pictures of all levels have the same error bound.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum SimdLevel {
-    /// The best that this processor has.
+    /// The best level of this processor.
     Best,
-    /// The least that this architecture has (SSE2 on x86-64).
+    /// The least level of this architecture (SSE2 on x86-64).
     Baseline,
     /// AVX2 and FMA.
     Avx2,
@@ -58,9 +58,10 @@ impl SimdLevel {
 }
 
 /// Runs an operation with the instructions of a [`Level`], as `fearless_simd::dispatch` does, on one of the levels that
-/// kernels are compiled for: the baseline stands for all below AVX2.
+/// kernels are compiled for: the baseline is used for all below AVX2.
 ///
-/// Each level is a copy of all kernels, and SSE 4.2 gains a tenth over SSE2, on processors older than 2013.
+/// Each level is a copy of all kernels. A level for SSE 4.2 would gain a tenth over SSE2, on processors older than
+/// 2013.
 #[cfg(target_arch = "x86_64")]
 #[macro_export]
 macro_rules! dispatch {
@@ -102,7 +103,7 @@ macro_rules! __vectorize {
     }};
 }
 
-/// Hides which level a token is of, so that an operation is written for all of them.
+/// Hides the type of a token's level, so that an operation is written for all of them.
 #[doc(hidden)]
 #[inline(always)]
 pub fn any_simd<S: Simd>(token: S) -> impl Simd {

@@ -1,9 +1,9 @@
-//! Lookups that SIMD vectors lack: words from many places of memory, and from a small table that registers hold.
+//! Lookups that SIMD vectors lack: words from scattered indices of memory, and from a small table in registers.
 
 use fearless_simd::{Level, Simd, prelude::*, u32x8, u32x16};
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
-/// The words at these places; the last one stands for those beyond the end, and zero if there are none.
+/// The words at eight indices. An index beyond the end gives the last word; an empty slice gives zeros.
 #[inline(always)]
 pub fn gather<S: Simd>(simd: S, words: &[AtomicU32], places: u32x8<S>) -> u32x8<S> {
     let Some(last) = words.len().checked_sub(1) else {
@@ -19,7 +19,8 @@ pub fn gather<S: Simd>(simd: S, words: &[AtomicU32], places: u32x8<S>) -> u32x8<
     u32x8::simd_from(simd, found)
 }
 
-/// How many words a table may have for processors of a level to look them up by one instruction, if they can.
+/// The greatest length of a table in which a processor of a level can look words up by one instruction, in words. None
+/// if it can't.
 #[inline(always)]
 pub fn places(level: Level) -> Option<usize> {
     #[cfg(target_arch = "x86_64")]
@@ -34,7 +35,7 @@ pub fn places(level: Level) -> Option<usize> {
     }
 }
 
-/// The words of a table at these places, modulo its length. It is quick where the length is what [`places`] says.
+/// The words of a table at sixteen indices, modulo its length. It is fast if the length is that of [`places`].
 #[inline(always)]
 pub fn look_up<S: Simd, const PLACES: usize>(
     simd: S,

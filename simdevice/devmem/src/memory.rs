@@ -11,18 +11,18 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 /// The alignment of every allocation in bytes, and the granularity at which the host backs it with pages.
 pub const PAGE_SIZE: u64 = 4096;
 
-/// The host could not back an allocation.
+/// The error that the host could not back an allocation.
 #[derive(Debug, thiserror::Error)]
 #[error("the host cannot back {size} bytes of device memory: {source}")]
 pub struct AllocationError {
     /// The length asked for in bytes.
     pub size: u64,
-    /// What the host said.
+    /// The host's error.
     #[source]
     pub source: std::io::Error,
 }
 
-/// An access reached past the end of an allocation; nothing was read or written.
+/// The error of an access past the end of an allocation. Nothing was read or written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{size} bytes at offset {offset} lie outside an allocation of {len} bytes")]
 pub struct OutOfBounds {
@@ -36,27 +36,27 @@ pub struct OutOfBounds {
 
 /// A range of device memory.
 ///
-/// Pages are backed when they are first touched, so that an allocation costs about what is used of it.
+/// The host backs its pages when they are first touched, so that only used memory costs memory.
 #[derive(Debug)]
 pub struct Allocation {
     map: MmapRaw,
     len: u64,
-    /// Bumped by every packet that writes; anything derived from the contents is keyed by it.
+    /// The number of packets that wrote, by which data derived from the contents tell whether they are up to date.
     generation: AtomicU64,
     host_visible: bool,
     derived: Derived,
 }
 
-/// Something that was derived from an allocation's contents.
+/// Data derived from an allocation's contents.
 pub type DerivedData = Arc<dyn Any + Send + Sync>;
 
-/// What was derived from the contents, for as long as they stay as they are.
+/// The data derived from the contents, kept until the contents change.
 #[derive(Default)]
 struct Derived(Mutex<Vec<DerivedData>>);
 
 impl Derived {
     fn lock(&self) -> MutexGuard<'_, Vec<DerivedData>> {
-        // A list of pointers is whole whatever panicked.
+        // A list of pointers is consistent after any panic.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -95,7 +95,7 @@ impl Allocation {
             .map_anon()
             .map_err(refuse)?;
         let map = MmapRaw::from(map);
-        // SAFETY: the mapping is new and nobody else's.
+        // SAFETY: the mapping is new and belongs to this function.
         unsafe { hints::prefer_huge(map.as_mut_ptr(), bytes) };
         Ok(Arc::new(Self {
             map,
@@ -112,30 +112,30 @@ impl Allocation {
         self.len
     }
 
-    /// Reports whether the host may map this memory, and so change it at any time without the device seeing it.
+    /// Reports whether the host may map this memory, and so change it at any time without the device noticing.
     pub fn is_host_visible(&self) -> bool {
         self.host_visible
     }
 
-    /// Counts the device's writes to this allocation (see [`Allocation::bump_generation`]).
+    /// The number of the device's writes to this allocation (see [`Allocation::bump_generation`]).
     pub fn generation(&self) -> u64 {
         self.generation.load(Ordering::Acquire)
     }
 
-    /// Marks the contents as changed, so that what was derived from them is derived anew.
+    /// Marks the contents as changed, and drops the data derived from them.
     pub fn bump_generation(&self) {
         self.generation.fetch_add(1, Ordering::AcqRel);
-        // Freed without the lock: it may take a while.
+        // They are freed without the lock, because that may take a while.
         drop(std::mem::take(&mut *self.derived.lock()));
     }
 
-    /// Keeps something that was derived from the contents until they change or the memory is freed. It says itself which
-    /// generation it belongs to: the contents may have changed since they were read.
+    /// Keeps data derived from the contents until these change or the memory is freed. The data must hold their own
+    /// generation: the contents may have changed since they were read.
     pub fn keep_derived(&self, data: DerivedData) {
         self.derived.lock().push(data);
     }
 
-    /// Forgets what was given to [`Allocation::keep_derived`].
+    /// Drops data that [`Allocation::keep_derived`] has kept.
     pub fn drop_derived(&self, data: &DerivedData) {
         self.derived.lock().retain(|kept| !Arc::ptr_eq(kept, data));
     }
@@ -162,8 +162,8 @@ impl Allocation {
         Ok(())
     }
 
-    /// Has `size` bytes from `offset` on, if they lie inside the allocation, on their way to the caches, where the
-    /// processor can be told so. It changes nothing but time.
+    /// Prefetches `size` bytes from `offset` on into the caches, if the processor can and they lie inside the
+    /// allocation. It changes only the time that accesses take.
     #[inline(always)]
     pub fn prefetch(&self, offset: u64, size: usize) {
         if let Ok(start) = self.checked(offset, size) {
@@ -311,7 +311,7 @@ pub struct BufferRange {
     pub memory: Arc<Allocation>,
     /// The first byte.
     pub offset: u64,
-    /// How many bytes.
+    /// The size in bytes.
     pub size: u64,
 }
 

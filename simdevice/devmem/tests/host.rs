@@ -1,4 +1,4 @@
-//! Host memory that isn't there. Injection is the process's, so that this file has one test.
+//! Tests of failing host allocations. Injection affects the whole process, so this file has one test.
 
 use devmem::Allocation;
 use devmem::host::*;

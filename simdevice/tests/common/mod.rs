@@ -9,12 +9,12 @@ use simdevice::state::{BlendEquation, BlendFactor, BlendOp, BlendState, Rect, Vi
 use simdevice::{Allocation, Config, Format, Image, ImageView, Packet};
 use std::sync::Arc;
 
-/// The framebuffer of every test: neither side is a multiple of a tile's.
+/// The width of every test's framebuffer, in pixels. Neither side is a multiple of a tile's.
 pub const WIDTH: u32 = 150;
-/// See [`WIDTH`].
+/// The height of every test's framebuffer, in pixels.
 pub const HEIGHT: u32 = 83;
 
-/// All pixels.
+/// The rectangle of all pixels.
 pub const EVERYTHING: Rect = Rect {
     x: 0,
     y: 0,
@@ -22,7 +22,7 @@ pub const EVERYTHING: Rect = Rect {
     height: HEIGHT,
 };
 
-/// Premultiplied "over".
+/// Blending of premultiplied colours with the "over" operator.
 pub const OVER: BlendState = BlendState {
     equations: Some((OVER_EQUATION, OVER_EQUATION)),
     write_mask: 0xF,
@@ -85,12 +85,12 @@ pub fn rendering(color: Attachment) -> Rendering {
     }
 }
 
-/// `count` random Gaussians as the packets of one draw, in memory that the host may map.
+/// The packets of one draw of `count` random Gaussians, in memory that the host may map.
 pub fn gaussians(seed: u64, count: u32, blend: BlendState) -> Vec<Packet> {
     gaussians_in(true, seed, count, blend)
 }
 
-/// As [`gaussians`], in memory that is `host_visible` or not.
+/// As [`gaussians`], in memory that the host may map or not.
 pub fn gaussians_in(host_visible: bool, seed: u64, count: u32, blend: BlendState) -> Vec<Packet> {
     const FLOATS: usize = 14;
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -174,7 +174,7 @@ pub fn begin(blend: BlendState) -> GaussianBegin {
     }
 }
 
-/// A clear of rectangles of layer 0.
+/// A packet that clears rectangles of layer 0.
 pub fn clear(clears: Vec<AttachmentClear>, rects: &[Rect]) -> Packet {
     Packet::ClearAttachments(ClearAttachments {
         clears,
@@ -182,7 +182,7 @@ pub fn clear(clears: Vec<AttachmentClear>, rects: &[Rect]) -> Packet {
     })
 }
 
-/// One worker, otherwise the default.
+/// A configuration with one worker and defaults otherwise.
 pub fn single() -> Config {
     Config {
         threads: 1,

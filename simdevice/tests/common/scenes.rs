@@ -23,22 +23,22 @@ use simdevice::stats::recorder::Recorder;
 use simdevice::{Allocation, CommandProcessor, Config, Device, Format, Packet};
 use std::sync::Arc;
 
-/// What is drawn.
+/// The kind of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     Triangles,
     Gaussians,
     /// Triangles, Gaussians, and triangles again, in one pass.
     Mixed,
-    /// Triangles, and Gaussians of which they hide some.
+    /// Triangles, and Gaussians, some of which the triangles hide.
     Hidden,
-    /// Gaussians that a program projects and a program resolves.
+    /// Gaussians with a vertex program and a fragment program.
     Shaded,
-    /// Dispatches alone.
+    /// Dispatches only.
     Dispatches,
 }
 
-/// Every kind, with the name that files of it have.
+/// Every kind, with its name in file names.
 pub const KINDS: [(Kind, &str); 6] = [
     (Kind::Triangles, "triangles"),
     (Kind::Gaussians, "gaussians"),
@@ -48,7 +48,7 @@ pub const KINDS: [(Kind, &str); 6] = [
     (Kind::Dispatches, "dispatches"),
 ];
 
-/// A recording device's configuration, and where its work goes.
+/// The configuration of a recording device, and its recorder.
 pub fn recording() -> (Config, Arc<Recorder>) {
     let recorder = Arc::new(Recorder::default());
     let config = Config {
@@ -58,7 +58,8 @@ pub fn recording() -> (Config, Arc<Recorder>) {
     (config, recorder)
 }
 
-/// Draws a scene in two frames, with `around` packets before and after all of it; the colour that it leaves.
+/// Draws a scene in two frames, with `around` packets before and after all of it. Returns the colour attachment's
+/// bytes.
 pub fn draw(kind: Kind, config: &Config, around: [&[Packet]; 2]) -> Vec<u8> {
     draw_on(&Arc::new(Device::new(config).unwrap()), kind, around)
 }
@@ -108,7 +109,7 @@ pub fn draw_on(device: &Arc<Device>, kind: Kind, around: [&[Packet]; 2]) -> Vec<
     bytes(&color)
 }
 
-/// The packets of a draw of Gaussians, which depths hide.
+/// The packets of a draw of Gaussians with a depth test.
 fn tested(mut packets: Vec<Packet>) -> Vec<Packet> {
     for packet in &mut packets {
         if let Packet::GaussianBegin(begin) = packet {
@@ -125,10 +126,10 @@ fn tested(mut packets: Vec<Packet>) -> Vec<Packet> {
     packets
 }
 
-/// Of a triangle's vertex: a position and a colour, four numbers each.
+/// The numbers of a triangle's vertex: four of the position and four of the colour.
 const FLOATS: usize = 8;
 
-/// A program that copies its inputs to outputs, the colours by way of some arithmetic.
+/// A program that copies its inputs to its outputs, the colours after some arithmetic.
 fn program(squared: std::ops::Range<usize>, count: usize) -> Program {
     let mut b = Builder::new();
     let inputs: Vec<_> = (0..count)
@@ -146,7 +147,7 @@ fn program(squared: std::ops::Range<usize>, count: usize) -> Program {
     b.finish().unwrap()
 }
 
-/// A dispatch that computes and keeps nothing.
+/// A dispatch that computes and stores nothing.
 fn dispatch(device: &Device) -> Packet {
     let mut b = Builder::new();
     let mut value = b.lane_index();
@@ -166,7 +167,7 @@ fn dispatch(device: &Device) -> Packet {
     }))
 }
 
-/// `count` Gaussians that programs project and resolve.
+/// `count` Gaussians drawn with a vertex program and a fragment program.
 fn shaded(device: &Device, seed: u64, count: u32) -> Vec<Packet> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut floats: Vec<f32> = Vec::new();

@@ -1,4 +1,4 @@
-//! The command processor's states: what is out of place is an error, and leaves it usable.
+//! The states of the command processor: a packet in the wrong state is an error, and leaves the processor usable.
 
 use crate::common::*;
 use simdevice::command_processor::ExecutionError;

@@ -1,4 +1,4 @@
-//! Dispatches through the command processor: every workgroup runs, work is counted, and nothing runs for ever.
+//! Dispatches through the command processor: every workgroup runs, work is counted, and every dispatch ends.
 
 use simdevice::command_processor::ExecutionError;
 use simdevice::isa::builder::Builder;
@@ -23,7 +23,7 @@ fn device() -> Arc<Device> {
     Arc::new(Device::new(&config).unwrap())
 }
 
-/// Each of 20 invocations stores its workgroup's number times 100 and its own.
+/// A program whose 20 invocations each store their workgroup's number times 100 plus their own.
 fn numbering() -> Program {
     let mut b = Builder::new();
     let group = b.input(0, Type::B32, Rate::Uniform);
@@ -82,7 +82,7 @@ fn every_workgroup_runs_and_its_work_is_counted() {
     let counters = processor.counters();
     assert_eq!(counters.get(Counter::ShaderBatches), 300);
     assert_eq!(counters.get(Counter::ShaderMemory), 300);
-    // 20 of 32 lanes.
+    // 20 of 32 lanes are active.
     let (active, lanes) = (
         counters.get(Counter::ShaderActiveLanes),
         counters.get(Counter::ShaderLanes),

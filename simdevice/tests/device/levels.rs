@@ -1,4 +1,4 @@
-//! SIMD levels, one by one: those that the processor lacks are ignored in view.
+//! Each SIMD level in a test of its own. A level that the processor lacks is reported as ignored.
 
 use crate::scenes::{KINDS, draw};
 use gaurast_runner::{Case, simd_levels};
@@ -8,7 +8,7 @@ use simdevice::runtime::SimdLevel;
 #[gaurast_runner::test(each = simd_levels())]
 fn every_level_draws_what_the_simplest_draws(case: &Case) {
     let level = SimdLevel::from_name(case.variant()).unwrap();
-    // The kernels' own tests go over these.
+    // The kernels' own tests use this list.
     assert!(SimdLevel::supported().contains(&(case.variant(), level)));
     for (kind, name) in KINDS {
         let [simplest, drawn] = [SimdLevel::Baseline, level].map(|simd| {
@@ -18,7 +18,7 @@ fn every_level_draws_what_the_simplest_draws(case: &Case) {
             };
             draw(kind, &config, [&[], &[]])
         });
-        // Levels that multiply and add in one step round once: a value may fall to its other neighbour.
+        // Levels with fused multiply-add round once: a value may be rounded to the other neighbour.
         let differ = |(a, b): (&u8, &u8)| a.abs_diff(*b);
         let most = simplest.iter().zip(&drawn).map(differ).max();
         assert!(most <= Some(1), "{name}: {most:?}");

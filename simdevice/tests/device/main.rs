@@ -1,4 +1,4 @@
-//! The device as those see it that give it packets: pictures, errors, counters, and what the model says that it costs.
+//! Tests of the device through packets: pictures, errors, counters, and the simulated cost.
 
 mod command_processor;
 #[path = "../common/mod.rs"]

@@ -1,4 +1,4 @@
-//! Render passes: the image depends on the draws alone, not on how the device goes about them.
+//! Render passes: the image depends only on the draws, not on how the device schedules them.
 
 use crate::common::*;
 use simdevice::format::{Aspect, ClearValue};
@@ -10,7 +10,7 @@ use simdevice::stats::query::{QueryKind, QueryPool, QueryResult};
 use simdevice::{CommandProcessor, Config, Device, Format, ImageView, Packet};
 use std::sync::Arc;
 
-/// Replaces the destination.
+/// Blending that replaces the destination.
 const REPLACE: BlendState = BlendState {
     equations: None,
     write_mask: 0xF,
@@ -56,7 +56,7 @@ fn blend(source: BlendFactor, destination: BlendFactor, op: BlendOp, write_mask:
     }
 }
 
-/// Draws and clears of every kind, `groups` of packets between which a barrier may stand.
+/// Draws and clears of every kind. A barrier may stand between two of the groups of packets.
 fn groups() -> Vec<Vec<Packet>> {
     let color = |index, value| AttachmentClear::Color {
         index,
@@ -227,7 +227,7 @@ fn the_number_of_threads_never_changes_a_bit_or_a_count() {
     }
 }
 
-/// The fragments of a draw: what it leaves in a floating-point attachment, `None` where it covers nothing.
+/// The fragments of a draw, from a floating-point attachment; `None` where it covers no pixel.
 fn fragments(draw: &[Packet]) -> Vec<Option<[f32; 4]>> {
     let view = image(Format::R32G32B32A32Sfloat, 1, 0);
     let uncovered = [-1.0; 4];

@@ -1,5 +1,5 @@
-//! The trace of work and what models make of it: nothing of it changes an image, the trace agrees with the counters,
-//! both models of the rasterizer with each other, and timelines are what viewers of traces can read.
+//! The trace of work and the models' results: recording doesn't change the image, the trace agrees with the counters,
+//! both models of the rasterizer agree with each other, and viewers of traces can read the timelines.
 
 use crate::common::{HEIGHT, WIDTH};
 use crate::scenes::{KINDS, Kind, draw, draw_on, recording};
@@ -23,7 +23,7 @@ fn trace(kind: Kind) -> Trace {
     recorder.trace()
 }
 
-/// What a query of a kind around a scene counts.
+/// The counters of a query around a scene.
 fn counted(kind: Kind, query: QueryKind, config: &Config) -> Counters {
     let pool = Arc::new(QueryPool::new(query, 1));
     let begin = Packet::BeginQuery {
@@ -41,7 +41,7 @@ fn counted(kind: Kind, query: QueryKind, config: &Config) -> Counters {
     }
 }
 
-/// The sum of something over the tiles of all draws of a mode.
+/// The sum of a tile's number over the tiles of all draws of a mode.
 fn sum(trace: &Trace, mode: Mode, of: impl Fn(&TileWork) -> u64) -> u64 {
     let draws = trace.frames.iter().flat_map(|frame| &frame.draws);
     let draws = draws.filter(|draw| draw.mode == mode);
@@ -71,7 +71,7 @@ fn nobody_sees_in_the_image_that_work_is_recorded() {
 
 #[gaurast_runner::test]
 fn the_trace_of_triangles_agrees_with_the_counters() {
-    // The trace tells of hardware that shades what is overwritten later.
+    // The trace describes hardware that also shades fragments that are overwritten later.
     let config = Config {
         optimizations: Optimizations::ALL.without(Optimization::OverwrittenQuads),
         ..Config::default()
@@ -103,7 +103,7 @@ fn the_trace_of_triangles_agrees_with_the_counters() {
     let draws: Vec<_> = trace.frames.iter().map(|frame| &frame.draws[0]).collect();
     let primitives: u64 = draws.iter().map(|draw| draw.primitives).sum();
     assert_eq!(primitives, counters.get(Counter::InputPrimitives));
-    // All that the shader cores did is before or after tiles.
+    // All work of the shader cores is before or after that of tiles.
     let operations: f64 = draws
         .iter()
         .map(|draw| draw.preprocess.operations() + draw.shade.operations())
@@ -115,12 +115,12 @@ fn the_trace_of_triangles_agrees_with_the_counters() {
     );
     for draw in draws {
         assert!(draw.preprocess.float > 0.0 && draw.shade.float > 0.0);
-        // 32 bytes of attributes and 32 of outputs a vertex, 36 a triangle.
+        // At least 32 bytes of attributes and 32 of outputs for each vertex, and 36 for each triangle.
         let least = 3.0 * draw.primitives as f64 * 64.0 + 36.0 * draw.drawn as f64;
         assert!(draw.preprocess.bytes >= least);
         assert!(draw.sized_pairs.is_sorted_by(|a, b| a > b), "{draw:?}");
         let listed: u64 = draw.pairs();
-        // Bounding boxes are of what is drawn, so that lists have no more.
+        // Bounding boxes are those of drawn primitives, so that lists have no more pairs.
         assert!(
             listed <= draw.sized_pairs[1],
             "{listed} {:?}",
@@ -141,7 +141,7 @@ fn programs_that_project_and_resolve_gaussians_are_charged_for_what_they_did() {
     for draw in &draws {
         assert_eq!((draw.mode, draw.primitives), (Mode::Gaussian, 1000));
         assert!(draw.drawn > 100 && draw.drawn < 1000, "{}", draw.drawn);
-        // What follows the vertex program is the device's: footprints, and no projection, and no harmonics.
+        // After the vertex program the device computes footprints, but no projection and no harmonics.
         let [footprints, sort] = stages::gaussian(&GaussianCounts {
             shaded: 1000,
             pairs: draw.pairs(),
@@ -159,7 +159,7 @@ fn programs_that_project_and_resolve_gaussians_are_charged_for_what_they_did() {
         programs +=
             draw.preprocess.operations() - footprints.operations() + draw.shade.operations();
     }
-    // Both programs, lane by lane.
+    // The operations of both programs, counted by lane.
     assert!(
         (programs - operations as f64).abs() < 0.5,
         "{programs} {operations}"
@@ -342,13 +342,13 @@ fn a_query_counts_what_the_model_says_of_the_trace() {
             "{name}: {occupancy}"
         );
         assert!(occupancy <= 100);
-        // Nobody asked for the model.
+        // Without a request for the model, no time is simulated.
         let plain = counted(kind, QueryKind::Performance, &Config::default());
         assert_eq!(plain.get(Counter::SimulatedTime), 0);
     }
 }
 
-/// What a query on a device counts that others may use.
+/// The counters of a query around a scene, on a device that others may use.
 fn counted_on(device: &Arc<Device>, kind: Kind) -> Counters {
     let pool = Arc::new(QueryPool::new(QueryKind::Simulated, 1));
     let [begin, end] = [true, false].map(|begins| {
@@ -380,7 +380,7 @@ fn queries_of_several_queues_count_what_is_their_own() {
                         let (kind, name) = KINDS[index];
                         let counted = counted_on(device, kind);
                         for counter in Counter::ALL {
-                            // Nanoseconds of the host are of the machine.
+                            // Host times differ between runs.
                             if counter.info().category != "time" {
                                 let values = [&counted, &alone[index]].map(|c| c.get(*counter));
                                 assert_eq!(values[0], values[1], "{name}, {counter:?}");

@@ -1,4 +1,4 @@
-//! Chunks that draws of the same Gaussians by several degrees of spherical harmonics share.
+//! Chunks that draws of the same Gaussians with several degrees of spherical harmonics share.
 
 use super::drawing::{draw_as_without_skips, with_bands_of_zeros};
 use crate::common::single;
@@ -6,8 +6,8 @@ use simdevice::stats::counters::Counter;
 use simdevice::{CommandProcessor, Config, Device, Packet};
 use std::sync::Arc;
 
-/// Draws Gaussians, which have coefficients up to degree 2, by each of these degrees in turn; says in which pictures chunks
-/// were made. Every picture is that of a device without optimizations.
+/// Draws Gaussians with coefficients up to degree 2, with each of these degrees in turn. Returns for each picture
+/// whether chunks were made. Every picture must equal that of a device without optimizations.
 fn built(cluster_budget_bytes: u64, degrees: &[u32]) -> Vec<bool> {
     let config = Config {
         cluster_budget_bytes,
@@ -33,10 +33,10 @@ fn built(cluster_budget_bytes: u64, degrees: &[u32]) -> Vec<bool> {
     pictures.collect()
 }
 
-/// Room for all coefficients.
+/// A budget in bytes that is enough for all coefficients.
 const AMPLE: u64 = 10 << 20;
 
-/// Room for those of degree 0, but not for all.
+/// A budget in bytes that is enough for the coefficients of degree 0, but not for all.
 const SCARCE: u64 = 400_000;
 
 #[gaurast_runner::test]

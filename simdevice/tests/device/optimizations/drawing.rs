@@ -1,4 +1,4 @@
-//! Sets of Gaussians in every mode, and drawing them with and without optimizations.
+//! Sets of Gaussians in every mode, drawn with and without optimizations.
 
 use crate::common::{
     HEIGHT, OVER, WIDTH, attachment, bytes, clear, gaussians, gaussians_in, image, rendering,
@@ -26,7 +26,7 @@ use simdevice::stats::optimizations::{Optimization, Optimizations};
 use simdevice::{Allocation, CommandProcessor, Config, Device, Format, Packet};
 use std::sync::Arc;
 
-/// Passes scalars on.
+/// A program that copies `count` scalars from inputs to outputs.
 pub fn pass_on(count: u32) -> Program {
     let mut b = Builder::new();
     for slot in 0..count {
@@ -73,7 +73,7 @@ pub fn programs() -> DrawPrograms {
     }
 }
 
-/// A draw of triangles, given by corners in clip space, that are tested for being nearer or not at all.
+/// A draw of triangles with corners in clip space, with a depth test or without.
 pub fn triangles(device: &Device, corners: &[[f32; 4]], tested: bool) -> Packet {
     let vertices: Vec<[f32; 8]> = corners
         .iter()
@@ -113,7 +113,7 @@ pub fn triangles(device: &Device, corners: &[[f32; 4]], tested: bool) -> Packet 
     }))
 }
 
-/// A triangle over half of the framebuffer and more, at a depth.
+/// A triangle over more than half of the framebuffer, at a depth.
 pub fn large(z: f32) -> [[f32; 4]; 3] {
     [
         [-1.0, -1.0, z, 1.0],
@@ -144,7 +144,7 @@ pub fn all_triangles(device: &Device) -> Vec<Packet> {
             layers.extend((0..5).flat_map(|number| small(9 * layer as u32 + number)));
         }
     }
-    // Where it begins before the others and where it ends behind them.
+    // Its depth is nearer than the others' at one end, and farther at the other.
     let slanted = [
         [-1.0, -1.0, 0.2, 1.0],
         [1.5, -1.0, 0.99, 1.0],
@@ -164,7 +164,7 @@ pub fn all_triangles(device: &Device) -> Vec<Packet> {
     ]
 }
 
-/// Gaussians in memory that only the device writes, most of them beside the scissor.
+/// Gaussians in memory that only the device writes, most of them outside the scissor.
 pub fn mostly_beside(seed: u64, count: u32) -> Vec<Packet> {
     let mut packets = gaussians_in(false, seed, count, OVER);
     if let Packet::GaussianBegin(begin) = &mut packets[0] {
@@ -178,7 +178,7 @@ pub fn mostly_beside(seed: u64, count: u32) -> Vec<Packet> {
     packets
 }
 
-/// Gaussians that only the device can write, in a set that begins otherwise.
+/// Gaussians that only the device can write, in a set whose begin packet is changed.
 pub fn changed(seed: u64, change: impl FnOnce(&mut GaussianBegin)) -> Vec<Packet> {
     let mut packets = gaussians_in(false, seed, 2000, OVER);
     if let Packet::GaussianBegin(begin) = &mut packets[0] {
@@ -187,7 +187,7 @@ pub fn changed(seed: u64, change: impl FnOnce(&mut GaussianBegin)) -> Vec<Packet
     packets
 }
 
-/// Three instances of Gaussians, each placed by a matrix and fainter than the one before.
+/// Three instances of Gaussians, each placed by a matrix and less opaque than the one before.
 pub fn placed() -> Vec<Packet> {
     let mut packets = changed(10, |_| {});
     let matrix = |number: f32| {
@@ -226,7 +226,7 @@ pub fn placed() -> Vec<Packet> {
     packets
 }
 
-/// Small Gaussians in another mode, most of them beside the scissor.
+/// Small Gaussians in another mode, most of them outside the scissor.
 pub fn mode_beside(seed: u64, change: fn(&mut GaussianBegin)) -> Vec<Packet> {
     let mut packets = mostly_beside(seed, 3000);
     if let Packet::GaussianBegin(begin) = &mut packets[0] {
@@ -237,7 +237,7 @@ pub fn mode_beside(seed: u64, change: fn(&mut GaussianBegin)) -> Vec<Packet> {
     packets
 }
 
-/// Makes the Gaussians of an append a fifth as large.
+/// Scales the Gaussians of an append packet by one fifth.
 pub fn shrink(append: &Packet) {
     let Packet::GaussianAppend(append) = append else {
         panic!("what follows the beginning of a set");
@@ -252,8 +252,8 @@ pub fn shrink(append: &Packet) {
     }
 }
 
-/// Modes that are bounded by other means than volumes in binary32 before a pinhole, with one of the ways in which those are
-/// drawn to compare with.
+/// Modes that need other bounds than those of binary32 volumes under a pinhole camera, and one mode that uses these,
+/// for comparison.
 pub fn bounded_modes() -> Vec<(&'static str, Vec<Packet>)> {
     fn state(begin: &mut GaussianBegin) -> &mut GaussianState {
         Arc::make_mut(&mut begin.state)
@@ -290,7 +290,7 @@ pub fn bounded_modes() -> Vec<(&'static str, Vec<Packet>)> {
         }),
         ("unscented", |begin| {
             state(begin).linearization = GaussianLinearization::Unscented;
-            // The farther off, the smaller.
+            // A Gaussian that is farther away is smaller.
             begin.camera.eye[2] = -6.0;
         }),
         ("unscented, orthographic", |begin| {
@@ -303,10 +303,12 @@ pub fn bounded_modes() -> Vec<(&'static str, Vec<Packet>)> {
     modes.chain([("placed", placed)]).collect()
 }
 
-/// Makes a set's state or camera another mode's.
+/// A change of a set's state or camera to another mode.
 pub type Change = fn(&mut GaussianBegin);
 
-/// Gaussians in modes that have no fast path, few Gaussians, many, many that only the device can write, of which all are equally deep in one scene, and several draws with a clear between them; how the attachment begins.
+/// Scenes, each with its packets and its attachment's load operation: Gaussians in modes without a fast path; few
+/// Gaussians; many; many that only the device can write, all of the same depth in one scene; several draws with a clear
+/// between them.
 pub fn scenes() -> Vec<(&'static str, Vec<Packet>, LoadOp)> {
     let clear_part = clear(
         vec![AttachmentClear::Color {
@@ -377,7 +379,8 @@ pub fn scenes() -> Vec<(&'static str, Vec<Packet>, LoadOp)> {
     ]
 }
 
-/// Draws a scene twice, over triangles where the attachment is loaded, on a device of its own; gives colours and depths.
+/// Draws a scene twice on a device of its own, over triangles if the attachment is loaded. Returns the bytes of colours
+/// and depths, and the counters.
 pub fn draw(optimizations: Optimizations, packets: &[Packet], load: LoadOp) -> (Vec<u8>, Counters) {
     let config = Config {
         optimizations,
@@ -393,7 +396,7 @@ pub fn draw(optimizations: Optimizations, packets: &[Packet], load: LoadOp) -> (
         stencil: 0,
     };
     rendering.depth = Some(attachment(&depth, LoadOp::Clear(far)));
-    // A pipeline belongs to its device.
+    // A pipeline belongs to one device.
     let triangles = match load {
         LoadOp::Load => all_triangles(&device),
         _ => Vec::new(),
@@ -409,7 +412,8 @@ pub fn draw(optimizations: Optimizations, packets: &[Packet], load: LoadOp) -> (
     (images, processor.counters().clone())
 }
 
-/// Draws a scene over black, in a pass of its own; gives what that counted. The picture is that of a device without optimizations.
+/// Draws a scene over black, in a pass of its own. Returns the counters of the pass. The picture must equal that of a
+/// device without optimizations.
 pub fn draw_as_without_skips(processor: &mut CommandProcessor, packets: &[Packet]) -> Counters {
     let over_black = LoadOp::Clear(ClearValue::Float([0.0, 0.0, 0.0, 1.0]));
     let before = processor.counters().clone();
@@ -419,14 +423,14 @@ pub fn draw_as_without_skips(processor: &mut CommandProcessor, packets: &[Packet
     for packet in begin.iter().chain(packets).chain([&Packet::EndRendering]) {
         processor.execute(packet).unwrap();
     }
-    // Depths are not among what is drawn here.
+    // Depths are not compared here.
     let (expected, _) = draw(Optimizations::NONE, packets, over_black);
     assert!(bytes(&target) == expected[..bytes(&target).len()]);
     processor.counters().since(&before)
 }
 
-/// What a device counts in each of four passes that draw the same, between which `change` is called with the pass's number
-/// and the device's memory; all images are those of a device without chunks.
+/// The counters of each of four passes that draw the same packets. After each pass, `change` is called with the pass's
+/// number and the device's memory. All images must equal those of a device without chunks.
 pub fn draw_again(config: &Config, change: impl Fn(usize, &Allocation)) -> Vec<Counters> {
     let packets = mostly_beside(7, 20_000);
     let Packet::GaussianAppend(append) = &packets[1] else {
@@ -465,8 +469,8 @@ pub fn chunks_built(passes: &[Counters]) -> Vec<u64> {
     built.collect()
 }
 
-/// Gaussians that only the device can write, the first of which are a wall before the others: large, opaque, and at most
-/// `right` of the middle.
+/// Gaussians that only the device can write. The first of them form a wall in front of the others: large, opaque, and
+/// at most `right` to the right of the middle.
 pub fn walled(seed: u64, right: f32, opacity: f32) -> Vec<Packet> {
     const FLOATS: u64 = 14;
     let packets = gaussians_in(false, seed, 12_000, OVER);
@@ -487,7 +491,7 @@ pub fn walled(seed: u64, right: f32, opacity: f32) -> Vec<Packet> {
     packets
 }
 
-/// Gaussians with coefficients of three degrees, of which the second and the third are zero in parts of space.
+/// Gaussians with coefficients of three degrees; those of the second and third are zero in parts of space.
 pub fn with_bands_of_zeros() -> Vec<Packet> {
     let mut packets = gaussians_in(false, 44, 4000, OVER);
     let Packet::GaussianAppend(append) = &mut packets[1] else {

@@ -1,4 +1,4 @@
-//! What others hide.
+//! Skipping of Gaussians that others hide.
 
 use super::drawing::{Change, draw, walled};
 use simdevice::Packet;

@@ -1,6 +1,6 @@
-//! Optimizations: each saves work, and none changes a bit.
+//! Optimizations: each saves work, and none changes a bit of the picture.
 //!
-//! Every scene is drawn twice to a target, since some of what is saved is prepared by the first time.
+//! Every scene is drawn twice to a target, because some optimizations use data that the first draw prepares.
 
 mod degrees;
 mod drawing;

@@ -1,4 +1,4 @@
-//! What is drawn again as it was is not projected again, and whatever changes is seen.
+//! Reuse of unchanged sets: a set that is drawn again unchanged is not projected again, and every change is noticed.
 
 use super::drawing::{draw_as_without_skips, programs};
 use crate::common::{OVER, attachment, gaussians_in, image, rendering, single};
@@ -15,11 +15,11 @@ use simdevice::stats::counters::Counter;
 use simdevice::{Allocation, CommandProcessor, Device, Format, Packet};
 use std::sync::Arc;
 
-/// What changes packets before they are drawn again.
+/// A change of packets before they are drawn again.
 pub(super) type Edit = Box<dyn FnMut(&mut [Packet])>;
 
-/// Draws `packets` as they are again and again, with a change before each pass but the first; says in which passes sets were
-/// drawn as they had been. Every picture is that of a device without optimizations.
+/// Draws `packets` repeatedly, with a change before each pass but the first. Returns the number of reused sets in each
+/// pass. Every picture must equal that of a device without optimizations.
 fn reused(packets: &mut [Packet], mut changes: Vec<Edit>) -> Vec<u64> {
     let device = Arc::new(Device::new(&single()).unwrap());
     let mut processor = CommandProcessor::new(device);
@@ -55,7 +55,7 @@ pub(super) fn of_append(mut change: impl FnMut(&mut GaussianAppend) + 'static) -
     })
 }
 
-/// In what only the device writes, without chunks.
+/// A few Gaussians in memory that only the device writes, too few for chunks.
 fn few() -> Vec<Packet> {
     gaussians_in(false, 41, 300, OVER)
 }
@@ -63,7 +63,7 @@ fn few() -> Vec<Packet> {
 #[gaurast_runner::test]
 fn what_has_not_changed_is_drawn_as_it_was() {
     assert_eq!(reused(&mut few(), vec![nothing(), nothing()]), [0, 1, 1]);
-    // Chunks are made for the second picture, and tell more of what is left out.
+    // Chunks are made for the second picture, and give more detail about what can be skipped.
     let mut many = gaussians_in(false, 42, 3000, OVER);
     let changes = vec![nothing(), nothing(), nothing()];
     assert_eq!(reused(&mut many, changes), [0, 0, 1, 1]);
@@ -141,7 +141,7 @@ fn what_a_program_resolves_is_a_set_of_its_own() {
         let counters = processor.counters().since(&before);
         counters.get(Counter::SetsUnchanged)
     });
-    // What is behind others may be left out of the one, and not of the other.
+    // Gaussians behind others may be skipped in one of the pictures and not in the other.
     assert_eq!(reused, [0, 0, 1, 0, 1]);
 }
 

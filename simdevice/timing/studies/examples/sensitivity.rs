@@ -1,4 +1,4 @@
-//! Writes SENSITIVITY.md and its plots: `sensitivity [FOLDER]`, by default this crate's.
+//! Writes SENSITIVITY.md and its plots: `sensitivity [FOLDER]`. The default folder is this crate's.
 
 use std::error::Error;
 use std::path::PathBuf;

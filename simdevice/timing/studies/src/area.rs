@@ -1,26 +1,26 @@
-//! Area from the paper's component counts: what a PE shares between modes, and what Gaussians add.
+//! Area from the paper's component counts: the triangle units of a PE, and the units added for Gaussians.
 
 use serde::Serialize;
 use timing::config::{AreaConfig, Config};
 
-/// Areas in mm2 of the rasterizer's technology, except where said.
+/// Areas in mm2 of the rasterizer's technology, unless a field says otherwise.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Area {
     /// A PE's 9 adders, 9 multipliers and divider.
     pub pe_triangle: f64,
-    /// 2 adders, a multiplier and the exponential more.
+    /// Its additional 2 adders, multiplier and exponential unit.
     pub pe_added: f64,
-    /// Of the added: the exponential.
+    /// The exponential unit, which is part of `pe_added`.
     pub exponential: f64,
-    /// What Gaussians add to all PEs.
+    /// The area added for Gaussians in all PEs.
     pub added: f64,
-    /// The same in the chip's technology.
+    /// The area added for Gaussians in all PEs, in mm2 of the chip's technology.
     pub added_in_soc: f64,
-    /// The share of the chip that it is.
+    /// `added_in_soc` as a share of the chip's area.
     pub share_of_soc: f64,
-    /// Added over what was there.
+    /// The added area over the area of the triangle units.
     pub ratio: f64,
-    /// What Gaussians add to all PEs with 16-bit units, whatever the machine's are.
+    /// The area added for Gaussians in all PEs if their units had 16 bits.
     pub added_half: f64,
 }
 
@@ -34,7 +34,7 @@ struct Units {
 }
 
 impl Units {
-    /// Of 32 bits. The exponential is what the paper's ratio leaves to it, unless it is given.
+    /// The areas of 32-bit units. If the exponential's area is not given, it is solved from the paper's ratio.
     fn single(table: &AreaConfig) -> Self {
         let mut units = Self {
             add: table.add_um2,
@@ -48,7 +48,7 @@ impl Units {
         units
     }
 
-    /// Of 16 bits: divider and exponential shrink as multipliers do.
+    /// The areas of 16-bit units. Divider and exponential shrink as multipliers do.
     fn half(table: &AreaConfig) -> Self {
         let single = Self::single(table);
         let shrink = table.half_mul_um2 / table.mul_um2;
@@ -60,18 +60,18 @@ impl Units {
         }
     }
 
-    /// Of a PE for triangles.
+    /// The area of a PE for triangles.
     fn there(&self) -> f64 {
         9.0 * self.add + 9.0 * self.mul + self.div
     }
 
-    /// Of what Gaussians add to it.
+    /// The area that Gaussians add to a PE.
     fn added(&self) -> f64 {
         2.0 * self.add + self.mul + self.exp
     }
 }
 
-/// The area that a configuration's components take: units of 16 bits where its numbers have two bytes at most.
+/// The area of a configuration's components. Units have 16 bits if its numbers have at most two bytes.
 pub fn area(config: &Config) -> Area {
     let table = &config.area;
     let units = if config.rasterizer.number_bytes <= 2 {

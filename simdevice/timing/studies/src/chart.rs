@@ -1,16 +1,16 @@
-//! Line charts as SVG, each step of the horizontal axis of the same width. Text is left to the reader's fonts, so that no
-//! font is part of a program.
+//! Line charts as SVG, whose steps along the horizontal axis all have the same width. Text uses the reader's fonts, so
+//! that no font is embedded.
 
 use std::fmt::Write;
 
-/// Room around the axes in pixels: left, top, right, bottom.
+/// The margins around the axes in pixels: left, top, right, bottom.
 const ROOM: [f64; 4] = [62.0, 14.0, 14.0, 48.0];
-/// Height of a line of the legend, and width of a letter, about.
+/// The height of a line of the legend in pixels; below, the approximate width of a letter.
 const LINE: f64 = 16.0;
 const LETTER: f64 = 6.5;
-/// Room beyond the first and last steps, in steps.
+/// The margin beyond the first and last steps, in steps.
 const MARGIN: f64 = 0.25;
-/// Names along the axis, at most.
+/// The most names along the axis.
 const MAX_NAMES: usize = 12;
 
 /// A line through one value per step.
@@ -35,7 +35,7 @@ pub struct Mark {
     pub step: usize,
 }
 
-/// A corner.
+/// A corner of a chart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Corner {
     /// The upper left.
@@ -49,11 +49,11 @@ pub enum Corner {
 pub struct Chart {
     /// Width and height in pixels.
     pub size: [u32; 2],
-    /// Names of the axes, across and up.
+    /// The names of the horizontal and the vertical axis.
     pub axes: [String; 2],
     /// The steps' names.
     pub steps: Vec<String>,
-    /// Curves; values that are no finite number are left out.
+    /// The curves. Values that are not finite are left out.
     pub curves: Vec<Curve>,
     /// Marks.
     pub marks: Vec<Mark>,
@@ -61,7 +61,7 @@ pub struct Chart {
     pub legend: Corner,
 }
 
-/// Charts side by side.
+/// Charts next to each other, as SVG.
 pub fn svg(charts: &[Chart]) -> String {
     let width: u32 = charts.iter().map(|chart| chart.size[0]).sum();
     let height = charts.iter().map(|chart| chart.size[1]).max().unwrap_or(0);
@@ -80,14 +80,14 @@ pub fn svg(charts: &[Chart]) -> String {
     )
 }
 
-/// Text with what SVG reads otherwise replaced.
+/// Text with SVG's special characters escaped.
 fn escaped(text: &str) -> String {
     text.replace('&', "&amp;")
         .replace('<', "&lt;")
         .replace('>', "&gt;")
 }
 
-/// A round step of which a few make up `top`.
+/// A round step that divides `top` into a few.
 fn round_step(top: f64) -> f64 {
     let rough = top / 6.0;
     let power = 10f64.powf(rough.log10().floor());
@@ -98,14 +98,14 @@ fn round_step(top: f64) -> f64 {
 }
 
 impl Chart {
-    /// The largest value, with some room above it.
+    /// The upper end of the vertical axis: above the largest value.
     fn top(&self) -> f64 {
         let values = self.curves.iter().flat_map(|curve| &curve.values);
         let finite = values.copied().filter(|value| value.is_finite());
         finite.fold(1e-9, f64::max) * 1.1
     }
 
-    /// The place of a step and a value in pixels.
+    /// The position of a step and a value, in pixels.
     fn place(&self, step: f64, value: f64) -> [f64; 2] {
         let [left, top, right, bottom] = ROOM;
         let [width, height] = self.size.map(f64::from);
@@ -287,7 +287,7 @@ mod tests {
         let [right, top] = chart.place(2.0 + MARGIN, 11.0);
         assert!((right - (400.0 - ROOM[2])).abs() < 1e-9 && (top - ROOM[1]).abs() < 1e-9);
         let text = svg(&[chart.clone(), chart]);
-        // The third value is no number.
+        // The third value is not a number.
         assert_eq!(text.matches("<circle").count(), 2 * 2);
         assert_eq!(text.matches("modules &amp; more</text>").count(), 2);
         assert_eq!(text.matches("stroke-dasharray").count(), 2);

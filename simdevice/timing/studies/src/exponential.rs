@@ -1,6 +1,7 @@
-//! Powers of two, defined bit by bit: the exponential unit of the processing element, in two designs. A number becomes a
-//! fixed-point one; its whole part is the result's exponent, and a table or a polynomial gives the power of the rest.
-//! Everything is an integer, so that `rtl/fp_exp2.sv` can compute the same bits; the table's file is written from here.
+//! Powers of two, defined bit by bit: the exponential unit of the processing element, in two designs. The argument
+//! becomes a fixed-point number. Its integer part is the result's exponent; a table or a polynomial gives the power of
+//! its fraction. All arithmetic is on integers, so that `rtl/fp_exp2.sv` can compute the same bits. This module also
+//! writes the table's SystemVerilog file.
 
 use crate::number::Format;
 use std::fmt::Write as _;
@@ -8,10 +9,10 @@ use std::fmt::Write as _;
 /// A design of the unit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Exponential {
-    /// A table of 64 entries and a quadratic in binary32, of 32 and a line in binary16.
+    /// A table. In binary32, 64 entries with a quadratic each; in binary16, 32 entries with a line each.
     #[default]
     Table,
-    /// One polynomial: of degree 5 in binary32, of 3 in binary16.
+    /// One polynomial: of degree 5 in binary32, of degree 3 in binary16.
     Polynomial,
 }
 
@@ -27,7 +28,7 @@ struct Widths {
     slope: u32,
     /// Fraction bits of the table's curvatures; 0: it has none.
     curvature: u32,
-    /// Coefficients of a power of the rest of the table's index: slope and curvature at 1.
+    /// The slope and the curvature at 1, as factors of the power.
     line: [f64; 2],
     /// Coefficients of the polynomial, the constant one first, with `power` fraction bits.
     polynomial: &'static [u64],
@@ -60,7 +61,7 @@ const HALF: Widths = Widths {
     polynomial: &[16_384, 11_363, 3_827, 1_187],
 };
 
-/// An entry of the table: the power at its beginning, the slope and the curvature there.
+/// An entry of the table: the power at the begin of its interval, the slope and the curvature there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Entry {
     power: u64,
@@ -77,7 +78,7 @@ impl Widths {
         }
     }
 
-    /// An entry, from roots and products alone, which every processor rounds alike.
+    /// Computes an entry from square roots and products alone, which every processor rounds alike.
     fn entry(&self, index: u64) -> Entry {
         let (mut root, mut power) = (2f64, 1f64);
         for bit in (0..self.index).rev() {
@@ -94,7 +95,7 @@ impl Widths {
         }
     }
 
-    /// The power of a fraction, from 1 to 2.
+    /// The power of a fraction by the table, from 1 to 2.
     fn table(&self, fraction: u64) -> u64 {
         let low_bits = self.fraction - self.index;
         let entry = self.entry(fraction >> low_bits);
@@ -107,7 +108,7 @@ impl Widths {
         entry.power + rise
     }
 
-    /// The same by Horner's rule.
+    /// The power of a fraction by the polynomial (Horner's rule), from 1 to 2.
     fn horner(&self, fraction: u64) -> u64 {
         let mut coefficients = self.polynomial.iter().rev();
         let first = coefficients.next().copied().unwrap_or_default();
@@ -130,7 +131,7 @@ pub fn exp2(format: Format, design: Exponential, x: u32) -> u32 {
         return far;
     }
     let significand = u64::from(x & ((1 << format.mantissa) - 1) | 1 << format.mantissa);
-    // The argument's leading one at the top of its whole part, then down to its place.
+    // Moves the argument's leading one to the top of the integer part, then shifts it down to its place.
     let up = format.exponent - 1 + widths.fraction - format.mantissa;
     let down = (i64::from(format.exponent) - 1 - unbiased).min(63);
     let magnitude = match exponent {

@@ -1,7 +1,7 @@
-//! Studies of the simulated GauRast hardware, on top of the timing model, which knows none of them: the paper's numbers
-//! beside the model's, sweeps over the machine's numbers, what each skip of the device would bring as hardware, area, charts,
-//! other ways to draw Gaussians ([`simt`], [`rivals`]); and the references that the model is held against, [`stepped`] cycle by cycle,
-//! [`pe`] and [`module`] bit by bit, and [`rtl`], the module in SystemVerilog.
+//! Studies of the simulated GauRast hardware with the timing model, which does not depend on them: the paper's numbers
+//! compared with the model's, sweeps over the hardware's numbers, the gain of each skip of the device as hardware,
+//! area, charts, other ways to draw Gaussians ([`simt`], [`rivals`]). Also the references that tests compare the model
+//! with: [`stepped`] cycle by cycle, [`pe`] and [`module`] bit by bit, and [`rtl`], the module in SystemVerilog.
 #![forbid(unsafe_code)]
 
 pub mod area;

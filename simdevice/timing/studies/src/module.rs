@@ -1,5 +1,5 @@
-//! A rasterizer module's results without its time: a tile's list through a processing element, pixel by pixel. It gives the
-//! bits that `rtl/raster_module.sv` writes, and the tile's work as the models of time take it.
+//! The results of a rasterizer module without its timing: a tile's list goes through a processing element, pixel by
+//! pixel. It gives the bits that `rtl/raster_module.sv` writes, and the tile's work for the timing models.
 
 use crate::exponential::Exponential;
 use crate::number::Format;
@@ -10,7 +10,7 @@ const GROUPS: usize = TILE_GROUPS as usize;
 /// Pixels of a group, and PEs of a module.
 const LANES: usize = 16;
 
-/// Groups of 16 pixels.
+/// The shape of a group of 16 pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Groups {
     /// Rows of a tile.
@@ -30,7 +30,7 @@ impl Groups {
     }
 }
 
-/// A primitive of a tile's list: the groups that it is evaluated in, a bit each, and its nine numbers.
+/// A primitive of a tile's list: the groups in which it is evaluated, a bit each, and its nine numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Primitive {
     /// A triangle.
@@ -40,14 +40,14 @@ pub enum Primitive {
 }
 
 impl Primitive {
-    /// Its groups.
+    /// The groups in which it is evaluated, a bit each.
     pub fn groups(&self) -> u16 {
         match self {
             Self::Triangle(groups, _) | Self::Gaussian(groups, _) => *groups,
         }
     }
 
-    /// Its numbers in memory's order.
+    /// Its numbers in the order of memory.
     pub fn numbers(&self) -> [u32; 9] {
         match self {
             Self::Triangle(_, triangle) => triangle.numbers(),
@@ -61,38 +61,39 @@ impl Primitive {
 pub struct List {
     /// The mode.
     pub mode: Mode,
-    /// At least one, in order.
+    /// The primitives in order, at least one.
     pub primitives: Vec<Primitive>,
 }
 
-/// A module as far as its results depend on it.
+/// The parameters of a module that its results depend on.
 #[derive(Clone, Debug)]
 pub struct Module {
-    /// Its numbers.
+    /// The format of its numbers.
     pub format: Format,
-    /// Its exponential units' design.
+    /// The design of its exponential units.
     pub exponential: Exponential,
-    /// Its groups.
+    /// The shape of its groups.
     pub groups: Groups,
-    /// Whether groups of finished pixels are left out.
+    /// True if groups of finished pixels are skipped.
     pub skips_groups: bool,
     /// Thresholds of the draw.
     pub thresholds: Thresholds,
-    /// Depth is the first plus the second over w.
+    /// The depth's two coefficients: depth is the first plus the second over w.
     pub depth: [u32; 2],
 }
 
-/// A tile that a module has drawn.
+/// The result of drawing a tile.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Drawn {
     /// Three numbers for each pixel, by group and lane: a colour, or u, v and depth.
     pub pixels: Vec<[u32; 3]>,
-    /// The work, with its runs as fine as single primitives. What a primitive reaches is what it is evaluated in.
+    /// The work of the tile. Its runs are cut between any two primitives whose numbers differ. A primitive reaches the
+    /// groups in which it is evaluated.
     pub work: TileWork,
 }
 
 impl Module {
-    /// A module with the usual thresholds and no change of depths.
+    /// A module with the thresholds of the original 3DGS code, and depth equal to 1/w.
     pub fn new(format: Format, exponential: Exponential, groups: Groups) -> Self {
         Self {
             format,
@@ -186,7 +187,7 @@ impl Module {
         Drawn { pixels, work }
     }
 
-    /// Compares depths as signs and magnitudes, so that -0 is nearer than 0.
+    /// Compares depths by sign and magnitude, so that -0 is nearer than 0.
     fn is_nearer(&self, depth: u32, than: u32) -> bool {
         let [a, b] = [depth, than].map(|depth| self.format.is_negative(depth));
         match (a, b) {
@@ -214,7 +215,7 @@ fn open_groups(pixels: &[Pixel]) -> u16 {
     open.fold(0, |open, (group, _)| open | 1 << group)
 }
 
-/// Adds a primitive to the runs, to the last one if it is like that.
+/// Appends a primitive to the runs; it extends the last run if that is equal to it.
 fn push(runs: &mut Vec<Run>, open: u16, rows: u8, reached: u16) {
     let (blocks, reached) = (open.count_ones() as u8, reached.count_ones());
     match runs.last_mut() {

@@ -1,6 +1,6 @@
-//! The numbers of the processing element, defined bit by bit: a sign, a biased exponent and a mantissa with a hidden one,
-//! rounded to nearest, ties to even. There are no subnormals, infinities or NaNs: what is too small is zero and keeps its
-//! sign, what is too large is the greatest number. The units of `rtl/` compute the same bits.
+//! The numbers of the processing element, defined bit by bit: a sign, a biased exponent and a mantissa with a hidden
+//! one, rounded to nearest, ties to even. There are no subnormals, infinities or NaNs: a result that is too small is
+//! zero with its sign, and one that is too large is the greatest number. The units of `rtl/` compute the same bits.
 
 /// A layout of numbers: 1 sign bit above `exponent` bits above `mantissa` bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,17 +16,17 @@ pub struct Format {
 struct Parts {
     sign: u32,
     exponent: i64,
-    /// With the hidden one; 0 for zero.
+    /// The significand with the hidden one; 0 for zero.
     significand: u64,
 }
 
 impl Format {
-    /// IEEE 754's binary32, of which the greatest exponent is a common one.
+    /// The layout of IEEE 754's binary32. The greatest exponent has no special meaning.
     pub const SINGLE: Self = Self {
         exponent: 8,
         mantissa: 23,
     };
-    /// IEEE 754's binary16, the same.
+    /// The layout of IEEE 754's binary16. The greatest exponent has no special meaning.
     pub const HALF: Self = Self {
         exponent: 5,
         mantissa: 10,
@@ -97,7 +97,7 @@ impl Format {
         sign | (exponent as u32) << self.mantissa | mantissa
     }
 
-    /// The sum.
+    /// The rounded sum.
     pub fn add(self, a: u32, b: u32) -> u32 {
         let magnitude = |a: u32| a & ((1 << (self.exponent + self.mantissa)) - 1);
         let (large, small) = if magnitude(a) >= magnitude(b) {
@@ -137,12 +137,12 @@ impl Format {
         self.round(large.sign, exponent, sum << zeros, EXTRA)
     }
 
-    /// The difference.
+    /// The rounded difference.
     pub fn sub(self, a: u32, b: u32) -> u32 {
         self.add(a, self.negate(b))
     }
 
-    /// The product.
+    /// The rounded product.
     pub fn mul(self, a: u32, b: u32) -> u32 {
         let (a, b) = (self.parts(a), self.parts(b));
         let sign = a.sign ^ b.sign;
@@ -157,7 +157,7 @@ impl Format {
         self.round(sign, exponent + i64::from(high), product, self.mantissa + 1)
     }
 
-    /// The quotient; of anything but zero by zero, the greatest number.
+    /// The rounded quotient. A division by zero gives the greatest number; zero by zero gives zero.
     pub fn div(self, a: u32, b: u32) -> u32 {
         let (a, b) = (self.parts(a), self.parts(b));
         let sign = (a.sign ^ b.sign) << (self.exponent + self.mantissa);
@@ -182,14 +182,14 @@ impl Format {
         )
     }
 
-    /// The nearest number.
+    /// The number nearest to a value.
     pub fn number(self, value: f32) -> u32 {
         let single = Self::SINGLE;
         let parts = single.parts(value.to_bits());
         if parts.significand == 0 {
             return parts.sign << (self.exponent + self.mantissa);
         }
-        // Room for a rounded bit in any case.
+        // More bits than any format keeps, so that rounding works for all.
         let exponent = parts.exponent - single.bias() + self.bias();
         let extra = single.mantissa - self.mantissa + 1;
         self.round(parts.sign, exponent, parts.significand << 1, extra)
@@ -227,7 +227,7 @@ mod tests {
         for _ in 0..400_000 {
             let (a, mut b) = (near_one(&mut random), near_one(&mut random));
             if random.random_bool(0.2) {
-                // Cancellation.
+                // Cancellation of almost equal numbers.
                 b = f32::from_bits(a.to_bits() ^ 0x8000_0000 ^ random.random_range(0..4));
             }
             let [x, y] = [a, b].map(f32::to_bits);
@@ -244,7 +244,8 @@ mod tests {
         for _ in 0..200_000 {
             let mut number = || random.random::<u32>() & 0x83ff | random.random_range(10..20) << 10;
             let (a, b) = (number(), number());
-            // Sums and products of two halves are exact in binary64, and so is the way to binary32 of what is checked.
+            // Sums and products of two binary16 numbers are exact in binary64, as is the conversion to binary32 of the
+            // checked ones.
             let nearest = |value: f64| {
                 let (down, up) = (half.number(value as f32), value);
                 let error = (half.value(down) - up).abs();

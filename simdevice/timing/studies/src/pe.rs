@@ -1,8 +1,10 @@
-//! The processing element: the adders, multipliers, divider and exponential unit are methods that compute the bits of
-//! [`crate::number`] and [`crate::exponential`], and every number goes through one of them. Nothing here is read from a
-//! table, so the counts can be held against the paper's Table II; `rtl/pe.sv` computes the same bits.
+//! The processing element. The adders, multipliers, divider and exponential unit are methods that compute the bits of
+//! [`crate::number`] and [`crate::exponential`], and every number is computed by one of them. The operations are
+//! counted, not read from a table, so that tests can compare them with the paper's Table II; `rtl/pe.sv` computes the
+//! same bits.
 //!
-//! The paper says how many units a PE has, not how they are wired. This is one wiring that needs exactly those:
+//! The paper gives the numbers of units of a PE, not how they are connected. This is one design that needs exactly
+//! them:
 //!
 //! - **Triangle**, 9 numbers in: the planes of u/w, v/w and 1/w over the tile, 3 each. Out: u, v and depth.
 //! - **Gaussian**, 9 numbers in: mean (2), the three coefficients of the exponent, log-opacity, colour (3). Opacity is
@@ -17,14 +19,14 @@ use timing::pe::Operations;
 /// A plane over the tile: `[x, y, 1]` times the coefficients.
 pub type Plane = [u32; 3];
 
-/// The nine numbers of a triangle. Places are counted from the tile's corner, in pixels.
+/// The nine numbers of a triangle. Positions are relative to the tile's corner, in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Triangle {
-    /// u/w, the second vertex's weight over w.
+    /// The plane of u/w, the second vertex's weight over w.
     pub u: Plane,
-    /// v/w, the third vertex's weight over w.
+    /// The plane of v/w, the third vertex's weight over w.
     pub v: Plane,
-    /// 1/w.
+    /// The plane of 1/w.
     pub w: Plane,
 }
 
@@ -36,7 +38,7 @@ impl Triangle {
         Self { u, v, w }
     }
 
-    /// The numbers in the order in which a list in memory has them.
+    /// The numbers in the order of a list in memory.
     pub fn numbers(&self) -> [u32; 9] {
         let Self { u, v, w } = self;
         [u[0], u[1], u[2], v[0], v[1], v[2], w[0], w[1], w[2]]
@@ -46,9 +48,9 @@ impl Triangle {
 /// The nine numbers of a Gaussian.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Gaussian {
-    /// Pixels from the tile's corner.
+    /// The mean, in pixels from the tile's corner.
     pub mean: [u32; 2],
-    /// Of dx^2, dx dy and dy^2 in the exponent, to the base 2.
+    /// The coefficients of dx^2, dx dy and dy^2 in the exponent, to the base 2.
     pub exponent: [u32; 3],
     /// The opacity's logarithm to the base 2.
     pub log_opacity: u32,
@@ -74,7 +76,8 @@ impl Gaussian {
         }
     }
 
-    /// The numbers in the order in which a list in memory has them: each where a triangle's is that goes to the same unit.
+    /// The numbers in the order of a list in memory. Each has the place of the triangle's number that goes to the same
+    /// unit.
     pub fn numbers(&self) -> [u32; 9] {
         let ([mx, my], [a, b, c], [red, green, blue]) = (self.mean, self.exponent, self.color);
         [a, b, mx, c, my, red, green, blue, self.log_opacity]
@@ -88,12 +91,12 @@ pub struct Pixel {
     pub color: [u32; 3],
     /// Transmittance.
     pub transmittance: u32,
-    /// Whether no Gaussian may change it any more.
+    /// True if no Gaussian may change it any more.
     pub finished: bool,
 }
 
 impl Pixel {
-    /// A pixel that nothing has touched.
+    /// A black pixel with full transmittance.
     pub fn new(format: Format) -> Self {
         Self {
             color: [0; 3],
@@ -103,19 +106,19 @@ impl Pixel {
     }
 }
 
-/// The thresholds of a draw, as positive numbers.
+/// The thresholds of a draw, all of them positive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Thresholds {
-    /// Least alpha that contributes.
+    /// The least alpha that contributes.
     pub alpha_floor: u32,
-    /// Greatest alpha.
+    /// The greatest alpha.
     pub alpha_ceiling: u32,
-    /// Least transmittance.
+    /// The least transmittance.
     pub transmittance_floor: u32,
 }
 
 impl Thresholds {
-    /// Those of the original 3DGS code.
+    /// The thresholds of the original 3DGS code.
     pub fn new(format: Format) -> Self {
         Self {
             alpha_floor: format.number(1.0 / 255.0),
@@ -125,7 +128,7 @@ impl Thresholds {
     }
 }
 
-/// The weights and depth that a triangle gives a pixel that it covers.
+/// The weights and depth of a triangle at a pixel that it covers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fragment {
     /// The second vertex's weight, perspective-correct.
@@ -143,12 +146,12 @@ pub struct Pe {
     pub format: Format,
     /// Its exponential unit's design.
     pub exponential: Exponential,
-    /// Operations done.
+    /// The operations done so far.
     pub operations: Operations,
 }
 
 impl Pe {
-    /// A processing element that has done nothing.
+    /// A processing element with no operations counted.
     pub fn new(format: Format, exponential: Exponential) -> Self {
         Self {
             format,
@@ -189,7 +192,7 @@ impl Pe {
         self.add(sum, plane[2])
     }
 
-    /// Evaluates a triangle at a pixel's centre; the fragment, if the pixel is covered. Depth is
+    /// Evaluates a triangle at a pixel's centre. Returns the fragment; None if the pixel is not covered. Depth is
     /// `depth[0] + depth[1] / w`.
     pub fn triangle(
         &mut self,
@@ -206,14 +209,14 @@ impl Pe {
         let rest = self.sub(rest, v);
         let scaled = self.mul(depth[1], inverse_w);
         let depth = self.add(depth[0], scaled);
-        // Coverage is in the signs.
+        // The signs tell whether the pixel is covered.
         let outside = [u, v, rest]
             .into_iter()
             .any(|weight| self.format.is_negative(weight));
         (!outside).then_some(Fragment { u, v, depth })
     }
 
-    /// Blends a Gaussian into a pixel with this centre; returns whether it contributed.
+    /// Blends a Gaussian into the pixel with this centre. Returns true if it contributed.
     pub fn gaussian(
         &mut self,
         g: &Gaussian,
@@ -231,7 +234,7 @@ impl Pe {
         let second = self.mul(down, dy);
         let power = self.add(first, second);
         let power = self.add(power, g.log_opacity);
-        // Both are positive, and compare as integers.
+        // Both are positive, so they compare as integers.
         let alpha = self.exp2(power).min(thresholds.alpha_ceiling);
         let below = self.sub(alpha, thresholds.alpha_floor);
         let reaches = !self.format.is_negative(below);
@@ -247,7 +250,7 @@ impl Pe {
             let product = self.mul(weight, value);
             *channel = self.add(*channel, product);
         }
-        // Selections: a pixel that is finished, or that the Gaussian doesn't reach, keeps what it has.
+        // Selections: a pixel that is finished, or that the Gaussian doesn't reach, is unchanged.
         if pixel.finished || !reaches {
             return false;
         }
@@ -286,7 +289,7 @@ mod tests {
             .collect()
     }
 
-    /// The same in binary64, straight from the definition.
+    /// The result in binary64, straight from the definition.
     fn reference(gaussians: &[Gaussian], at: [u32; 2]) -> ([f64; 3], f64) {
         let (mut color, mut t) = ([0.0; 3], 1.0);
         for g in gaussians {

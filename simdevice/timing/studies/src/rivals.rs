@@ -1,13 +1,13 @@
-//! What else could draw Gaussians, on the same machine: as blended quads through the rasterizer that every GPU has; and what
-//! other accelerators say of themselves.
+//! Other ways to draw Gaussians on the same chip: as blended quads through the rasterizer that every GPU has; and the
+//! published numbers of other accelerators.
 
 use serde::Serialize;
 use timing::config::Config;
 use timing::shader_cores;
 use timing::work::{DrawWork, FrameWork, Mode, ShaderWork, TILE_GROUPS, TILE_PIXELS};
 
-/// Stage 3 by quads: each Gaussian two triangles around its ellipse, shaded by a fragment program and blended by the ROPs.
-/// Nothing ends early, for a blend is all that the hardware knows of a pixel.
+/// Stage 3 by quads: each Gaussian is two triangles around its ellipse, shaded by a fragment program and blended by the
+/// ROPs. Nothing ends early, because blending hardware doesn't know that a pixel is finished.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Quads {
     /// Fragments that are shaded.
@@ -18,7 +18,7 @@ pub struct Quads {
     pub setup_ms: f64,
     /// Milliseconds of blending.
     pub blend_ms: f64,
-    /// Milliseconds of main memory, where every blend hits the cache of its tile.
+    /// Milliseconds of main memory, if every blend hits the cache of its tile.
     pub memory_ms: f64,
 }
 
@@ -31,10 +31,11 @@ const SETUPS_PER_CYCLE: f64 = 2.0;
 const PIXEL_BYTES: f64 = 8.0;
 /// Bytes of a Gaussian's instance: centre, axes, colour and opacity.
 const INSTANCE_BYTES: f64 = 36.0;
-/// Fragments shaded over those in a Gaussian's blocks of 4x4 pixels: a rectangle around an ellipse has 4/pi times its area.
+/// The ratio of shaded fragments to the pixels of a Gaussian's 4x4 blocks: a rectangle has 4/pi times the area of its
+/// ellipse.
 const RECTANGLE: f64 = 4.0 / std::f64::consts::PI;
 
-/// A fragment program: the form of two interpolated numbers, its test, an exponential, four outputs.
+/// The work of a fragment: the quadratic form of two interpolated numbers, its test, an exponential, four outputs.
 const FRAGMENT: ShaderWork = ShaderWork {
     float: 10.0,
     integer: 2.0,
@@ -46,7 +47,7 @@ const FRAGMENT: ShaderWork = ShaderWork {
     bytes: 0.0,
 };
 
-/// A vertex: a corner of the rectangle.
+/// The work of a vertex, which is a corner of the rectangle.
 const VERTEX: ShaderWork = ShaderWork {
     float: 12.0,
     integer: 4.0,
@@ -59,14 +60,14 @@ const VERTEX: ShaderWork = ShaderWork {
 };
 
 impl Quads {
-    /// Milliseconds: the units work side by side, and the slowest of them is what it takes.
+    /// Milliseconds of the whole: the units work in parallel, and the slowest of them decides.
     pub fn milliseconds(&self) -> f64 {
         [self.shade_ms, self.setup_ms, self.blend_ms, self.memory_ms]
             .into_iter()
             .fold(0.0, f64::max)
     }
 
-    /// The slowest unit.
+    /// The name of the slowest unit.
     pub fn limit(&self) -> &'static str {
         let units = [
             ("shading", self.shade_ms),
@@ -79,8 +80,8 @@ impl Quads {
     }
 }
 
-/// Pixels of the blocks that a draw's Gaussians reach, were none left out because it is finished: the lists' rests are taken
-/// to reach as many as what was looked at.
+/// The pixels of the 4x4 blocks that a draw's Gaussians reach, if no finished pixel is skipped. The rests of lists,
+/// beyond the last run, are taken to reach as many blocks as their beginnings.
 fn pixels(draw: &DrawWork) -> f64 {
     let tile = |tile: &timing::work::TileWork| {
         let reached: u32 = tile
@@ -94,7 +95,7 @@ fn pixels(draw: &DrawWork) -> f64 {
     draw.tiles.iter().map(tile).sum()
 }
 
-/// Stage 3 of a frame's Gaussians by quads on the machine's GPU as it is.
+/// Stage 3 of a frame's Gaussians, drawn as quads on the configuration's GPU without GauRast.
 pub fn quads(frame: &FrameWork, config: &Config) -> Quads {
     let draws = || {
         frame
@@ -127,13 +128,13 @@ pub struct Published {
     pub name: &'static str,
     /// The number; empty where its source was not read.
     pub number: &'static str,
-    /// Scenes, or that the abstract doesn't name them.
+    /// The scenes; or a note that the abstract doesn't name them.
     pub scenes: &'static str,
     /// Resolution of the pictures.
     pub resolution: &'static str,
-    /// What it is held against.
+    /// The baseline of the comparison.
     pub baseline: &'static str,
-    /// Who says so.
+    /// The source of the number.
     pub source: &'static str,
 }
 
@@ -148,7 +149,7 @@ const GSCORE: Published = Published {
     source: "GSCore's abstract, ASPLOS 2024",
 };
 
-/// Published numbers, each with what it is of. None of them enters the model.
+/// Published numbers, each with its conditions. None of them is an input of the model.
 pub const PUBLISHED: [Published; 12] = [
     GSCORE,
     Published {
@@ -253,7 +254,7 @@ mod tests {
         frame.draws[0].drawn = 100_000;
         let all = quads(&frame, &config);
         assert!((all.fragments / (400_000.0 * 256.0 * RECTANGLE) - 1.0).abs() < 1e-9);
-        // A list of which a half was looked at is drawn whole.
+        // Half of the list was evaluated; quads draw all of it.
         for tile in &mut frame.draws[0].tiles {
             tile.runs[0].primitives /= 2;
             tile.runs[0].reached /= 2;

@@ -55,7 +55,7 @@ pub fn sources() -> Vec<&'static str> {
         .collect()
 }
 
-/// Cycles until the bench's memory answers what could not be foreseen, the presets' 100 ns.
+/// Cycles until the bench's memory answers a request that was not made ahead: the presets' 100 ns.
 pub const LATENCY: u32 = 100;
 
 /// Cycles of a PE, as `latencies.svh` has them.
@@ -65,12 +65,12 @@ pub struct Latencies {
     pub gaussian: u32,
     /// From a triangle's operands to weights and depth.
     pub triangle: u32,
-    /// Between two Gaussians of a pixel, at least.
+    /// The least distance between two Gaussians of a pixel.
     pub carried: u32,
 }
 
 impl Latencies {
-    /// Those of a PE whose numbers and exponential are these.
+    /// The latencies of a PE with a format and a design of the exponential.
     pub fn of(format: Format, exponential: Exponential) -> Self {
         let (add, mul) = (3, 3);
         let div = (format.mantissa + 3) / 2 + 2;
@@ -87,21 +87,20 @@ impl Latencies {
         }
     }
 
-    /// The longer of both modes.
+    /// The longer of the two modes' latencies.
     pub fn longest(self) -> u32 {
         self.gaussian.max(self.triangle)
     }
 }
 
-/// Writes all files to a folder, which is created if need be.
+/// Writes all files to a folder, which is created if it doesn't exist.
 ///
-/// # Errors
-/// As for writing files.
+/// # Errors Returns the error of writing a file.
 pub fn write(folder: &Path) -> Result<()> {
     std::fs::create_dir_all(folder)?;
     for (name, text) in files() {
         let path = folder.join(name);
-        // What is built of a file is as old as the file.
+        // An unchanged file keeps its time, so that it is not compiled again.
         if std::fs::read_to_string(&path).is_ok_and(|there| there == text) {
             continue;
         }
@@ -110,7 +109,7 @@ pub fn write(folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Builds a program of a top module and its bench by Verilator; returns its path.
+/// Compiles a top module and its bench with Verilator. Returns the program's path.
 fn build(folder: &Path, top: &str, format: Format, parameters: &[String]) -> Result<PathBuf> {
     write(folder)?;
     let objects = format!("{top}{}", format.bits());
@@ -149,7 +148,7 @@ fn build(folder: &Path, top: &str, format: Format, parameters: &[String]) -> Res
     Ok(folder.join(objects).join(format!("V{top}")))
 }
 
-/// Runs a bench on words, and returns words.
+/// Runs a bench on input words. Returns its output words.
 fn run(program: &Path, words: &[u32]) -> Result<Vec<u32>> {
     let folder = program.parent().unwrap_or(Path::new("."));
     let unique = format!("{}-{:?}", std::process::id(), std::thread::current().id());
@@ -174,24 +173,22 @@ fn run(program: &Path, words: &[u32]) -> Result<Vec<u32>> {
         .collect())
 }
 
-/// Every unit in every design, under Verilator.
+/// A program that runs every unit, in every design, under Verilator.
 #[derive(Debug)]
 pub struct UnitBench(PathBuf);
 
 impl UnitBench {
-    /// Builds the units for a format in a folder, which keeps what was built.
+    /// Compiles the units for a format in a folder, which keeps the compiled program.
     ///
-    /// # Errors
-    /// Where there is no Verilator or it refuses.
+    /// # Errors Returns an error if Verilator is missing or fails.
     pub fn build(folder: &Path, format: Format) -> Result<Self> {
         build(folder, "units", format, &[]).map(Self)
     }
 
-    /// Sum, sum by two paths, product, product by Booth's digits, quotient, power by the table and by the polynomial (of the
-    /// first) of each pair.
+    /// Computes for each pair: the sum, the sum by two paths, the product, the product by Booth's digits, the quotient,
+    /// and the power of the first number by the table and by the polynomial.
     ///
-    /// # Errors
-    /// Where the program cannot be run.
+    /// # Errors Returns an error if the program can't be run.
     pub fn run(&self, pairs: &[[u32; 2]]) -> Result<Vec<[u32; 7]>> {
         let words = run(&self.0, pairs.as_flattened())?;
         let (results, _) = words.as_chunks();
@@ -199,42 +196,41 @@ impl UnitBench {
     }
 }
 
-/// A rasterizer module under Verilator.
+/// A program that runs a rasterizer module under Verilator.
 #[derive(Debug)]
 pub struct ModuleBench {
     program: PathBuf,
     format: Format,
 }
 
-/// What a module did.
+/// The result of a run of the module.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rasterized {
-    /// Cycles until nothing was left.
+    /// Cycles until all work is done.
     pub cycles: u32,
-    /// Cycles of the PEs: nothing to do, a pixel each, waiting for a transmittance, for memory, for the controller, changing
-    /// modes.
+    /// Cycles of the PEs by cause: no work, evaluating a pixel each, waiting for a transmittance, for memory, for the
+    /// controller, changing modes.
     pub causes: [u32; 6],
-    /// Cycles of a pixel on its way, at most.
+    /// The most cycles that a pixel spends in the pipeline.
     pub latency: u32,
     /// The pixels of each list, as [`crate::module::Drawn::pixels`].
     pub pixels: Vec<Vec<[u32; 3]>>,
 }
 
 impl ModuleBench {
-    /// Builds a module for a format in a folder, which keeps what was built; `parameters` as Verilator takes them.
+    /// Compiles a module for a format in a folder, which keeps the compiled program. `parameters` are Verilator's
+    /// arguments.
     ///
-    /// # Errors
-    /// Where there is no Verilator or it refuses.
+    /// # Errors Returns an error if Verilator is missing or fails.
     pub fn build(folder: &Path, format: Format, parameters: &[String]) -> Result<Self> {
         let program = build(folder, "raster_module", format, parameters)?;
         Ok(Self { program, format })
     }
 
-    /// Draws lists one after the other on a module, whose memory answers a request that could not be foreseen after
-    /// `latency` cycles.
+    /// Draws lists one after the other on a module. Memory answers a request that was not made ahead after `latency`
+    /// cycles.
     ///
-    /// # Errors
-    /// Where the program cannot be run.
+    /// # Errors Returns an error if the program can't be run.
     pub fn run(&self, lists: &[List], module: &Module, latency: u32) -> Result<Rasterized> {
         let thresholds = &module.thresholds;
         let mut words = vec![
@@ -277,7 +273,7 @@ impl ModuleBench {
         })
     }
 
-    /// Appends a list to memory, and room up to a multiple of 16 bytes.
+    /// Appends a list to memory, padded to a multiple of 16 bytes.
     fn store(&self, list: &List, memory: &mut Vec<u8>) {
         let bytes = self.format.bits() as usize / 8;
         for primitive in &list.primitives {
@@ -289,7 +285,8 @@ impl ModuleBench {
         memory.resize(memory.len().next_multiple_of(16), 0);
     }
 
-    /// A tile's pixels from what was written: groups, of each the first numbers of all its pixels, then the second ones.
+    /// A tile's pixels from the written words: for each group, the first numbers of all its pixels, then the second
+    /// ones.
     fn pixels(&self, tile: &[u32]) -> Vec<[u32; 3]> {
         let bits = self.format.bits() as usize;
         let number = |index: usize| {

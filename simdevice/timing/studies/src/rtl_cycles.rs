@@ -1,4 +1,4 @@
-//! Cycles of the module in SystemVerilog beside those of the stepped model, for the same lists.
+//! Cycles of the module in SystemVerilog compared with those of the stepped model, for the same lists.
 
 use crate::exponential::Exponential;
 use crate::module::{Drawn, Groups, List, Module};
@@ -11,21 +11,21 @@ use timing::config::{Config, ConfigError};
 use timing::raster::RasterReport;
 use timing::work::{DrawWork, TileWork};
 
-/// A way to run the module.
+/// A configuration of the module.
 #[derive(Clone, Copy, Debug)]
 pub struct Setting {
     /// Its name in a table.
     pub name: &'static str,
-    /// Its groups.
+    /// The shape of its groups.
     pub groups: Groups,
-    /// Whether primitives are evaluated in groups that they reach, and groups of finished pixels are left out.
+    /// True if primitives are evaluated only in groups that they reach, and groups of finished pixels are skipped.
     pub masked: bool,
     /// A seed for its lists.
     pub seed: u64,
 }
 
 impl Setting {
-    /// The paper's way, and two that leave groups out.
+    /// The paper's configuration, and two that skip groups.
     pub const ALL: [Self; 3] = [
         Self {
             name: "whole tiles",
@@ -55,24 +55,23 @@ impl Setting {
     }
 }
 
-/// Cycles of both for the same lists.
+/// Cycles of the module and of the stepped model for the same lists.
 #[derive(Clone, Debug)]
 pub struct Cycles {
     rasterized: Rasterized,
     stepped: RasterReport,
-    /// Pixels in which the two differ.
+    /// The number of pixels in which the two differ.
     pub different_pixels: usize,
-    /// Lists.
+    /// The number of lists.
     pub tiles: usize,
-    /// Cycles of a pixel on its way through the module's PEs, with the register of its operands.
+    /// Cycles of a pixel in the pipeline of the module's PEs, with the register of its operands.
     pub latency: u32,
 }
 
 impl Cycles {
-    /// Runs both.
+    /// Runs the module and the model.
     ///
-    /// # Errors
-    /// Where the bench cannot be run.
+    /// # Errors Returns an error if the bench can't be run.
     pub fn of(
         bench: &ModuleBench,
         setting: Setting,
@@ -97,8 +96,8 @@ impl Cycles {
         })
     }
 
-    /// Cycles of the module and of the model: all, a pixel for each PE, waiting for a transmittance, for memory, for the
-    /// controller, changing modes.
+    /// Cycles of the module and of the model, by cause: all, evaluating a pixel for each PE, waiting for a
+    /// transmittance, for memory, for the controller, changing modes.
     pub fn by_cause(&self) -> [[f64; 2]; 6] {
         let modules = &self.stepped.modules;
         let [_, busy, dependency, memory, controller, modes] =
@@ -114,7 +113,8 @@ impl Cycles {
     }
 }
 
-/// One module of these numbers whose port alone limits. What a list's primitives are evaluated in is in its runs.
+/// A configuration with one module of these numbers, limited only by its port. A list's runs say in which groups its
+/// primitives are evaluated.
 fn machine(format: Format) -> std::result::Result<Config, ConfigError> {
     let base = match format {
         Format::HALF => "fp16",
@@ -129,7 +129,7 @@ fn machine(format: Format) -> std::result::Result<Config, ConfigError> {
     Config::preset(base, &settings.map(str::to_owned))
 }
 
-/// The work of lists one after the other, each a tile of its own.
+/// A frame of lists that are drawn one after the other, each a tile of its own.
 fn frame(lists: &[List], drawn: &[Drawn]) -> FrameWork {
     let draw = |(index, (list, drawn)): (usize, (&List, &Drawn))| DrawWork {
         mode: list.mode,

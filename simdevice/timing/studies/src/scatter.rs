@@ -1,10 +1,10 @@
-//! Plots of points and lines over two numbers as SVG, on linear or logarithmic axes.
+//! Scatter plots of points and lines as SVG, on linear or logarithmic axes.
 
 use std::fmt::Write;
 
-/// Room around the axes in pixels: left, top, right, bottom.
+/// The margins around the axes in pixels: left, top, right, bottom.
 const ROOM: [f64; 4] = [68.0, 16.0, 24.0, 48.0];
-/// Marks of a linear axis, about.
+/// The approximate number of marks on a linear axis.
 const MARKS: f64 = 6.0;
 
 /// An axis.
@@ -12,29 +12,29 @@ const MARKS: f64 = 6.0;
 pub struct Axis {
     /// Its name.
     pub name: String,
-    /// Whether each step is ten times the one before.
+    /// True if the axis is logarithmic: each mark is ten times the one before.
     pub logarithmic: bool,
 }
 
-/// A point with a name, which a reader sees beside it or, where there is none to see, when pointing at it.
+/// A named point. The name is written at the point, or shown as a tooltip.
 #[derive(Clone, Debug)]
 pub struct Point {
-    /// Across and up.
+    /// The horizontal and the vertical value.
     pub at: [f64; 2],
     /// Its name.
     pub name: String,
-    /// Whether the name is written beside it.
+    /// True if the name is written at the point.
     pub labelled: bool,
     /// A colour of SVG.
     pub color: &'static str,
 }
 
-/// A line through places.
+/// A line through points.
 #[derive(Clone, Debug)]
 pub struct Line {
-    /// Places, across and up.
+    /// The points, each a horizontal and a vertical value.
     pub through: Vec<[f64; 2]>,
-    /// Its name, written at its last place.
+    /// Its name, written at its last point.
     pub name: String,
     /// A colour of SVG.
     pub color: &'static str,
@@ -45,22 +45,23 @@ pub struct Line {
 pub struct Plot {
     /// Width and height in pixels.
     pub size: [u32; 2],
-    /// Across and up.
+    /// The horizontal and the vertical axis.
     pub axes: [Axis; 2],
-    /// Points; those that are no finite numbers, or not positive on a logarithmic axis, are left out.
+    /// The points. Those with values that are not finite, or not positive on a logarithmic axis, are left out.
     pub points: Vec<Point>,
-    /// Lines, below the points; the same.
+    /// The lines, below the points. Values are left out as for points.
     pub lines: Vec<Line>,
 }
 
-/// Least and greatest place of an axis, and places of its marks with their names; of a logarithmic one, logarithms.
+/// The least and the greatest position of an axis, and its marks with their names. Positions on a logarithmic axis are
+/// logarithms.
 struct Scale {
     range: [f64; 2],
     marks: Vec<(f64, String)>,
 }
 
 impl Axis {
-    /// The place of a value before it is scaled to pixels.
+    /// The position of a value, before it is scaled to pixels.
     fn place(&self, value: f64) -> f64 {
         if self.logarithmic {
             value.log10()
@@ -119,7 +120,7 @@ fn decade(power: i32) -> String {
     }
 }
 
-/// Text with what SVG reads otherwise replaced.
+/// Text with SVG's special characters escaped.
 fn escaped(text: &str) -> String {
     text.replace('&', "&amp;")
         .replace('<', "&lt;")
@@ -240,7 +241,8 @@ impl Plot {
     }
 }
 
-/// Places of which no other is at most as far along both numbers and nearer along one, in order of the first number.
+/// The indices of the points on the Pareto front, ordered by the first value: no other point is at most as large in
+/// both values and smaller in one.
 pub fn pareto(places: &[[f64; 2]]) -> Vec<usize> {
     let mut order: Vec<_> = (0..places.len()).collect();
     order.sort_by(|&a, &b| {
@@ -299,7 +301,7 @@ mod tests {
             }],
         };
         let svg = plot.svg();
-        // A point at zero has no place on a logarithmic axis.
+        // A point at zero has no position on a logarithmic axis.
         assert_eq!(svg.matches("<circle").count(), 2);
         assert!(svg.contains("<circle cx=\"68.0\"") && svg.contains(">a &lt; b</text>"));
         for mark in ["1", "10", "100", "1000"] {

@@ -1,12 +1,12 @@
-//! A generated scene for sweeps: round Gaussians in front of each other, composited by the definition, so that lists end
-//! and blocks finish as they do in pictures. It needs no device, and is the same everywhere.
+//! A generated scene for sweeps: round Gaussians in front of each other, composited by the definition, so that lists
+//! end and blocks finish as in real pictures. It needs no device, and is the same on every machine.
 
 use timing::stages::{self, GaussianCounts};
 use timing::work::{DrawWork, FrameWork, Run, TILE_GROUPS, TILE_SIDE, TILE_SIDES, TileWork};
 
-/// Gaussians after which it is looked at what is finished, as in the device.
+/// The number of Gaussians after which finished pixels are looked for, as in the device.
 const CHUNK: usize = 32;
-/// Least alpha that contributes, greatest alpha, least transmittance.
+/// The least alpha that contributes, the greatest alpha, the least transmittance.
 const THRESHOLDS: [f64; 3] = [1.0 / 255.0, 0.99, 1e-4];
 
 /// A Gaussian on the screen.
@@ -16,16 +16,16 @@ struct Round {
     /// 1 / (2 sigma^2).
     falloff: f64,
     opacity: f64,
-    /// Where alpha falls below its floor.
+    /// The radius at which alpha falls below its floor.
     reach: f64,
     sigma: f64,
 }
 
-/// Numbers that look random (a 64-bit linear congruential generator, upper bits).
+/// A generator of random numbers (a 64-bit linear congruential generator, upper bits).
 struct Chance(u64);
 
 impl Chance {
-    /// From 0 to below 1.
+    /// A number from 0 to below 1.
     fn number(&mut self) -> f64 {
         self.0 = self
             .0
@@ -34,13 +34,14 @@ impl Chance {
         (self.0 >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// Nearly normally distributed: the sum of twelve.
+    /// A nearly normally distributed number: the sum of twelve.
     fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.number()).sum::<f64>() - 6.0
     }
 }
 
-/// A frame of `count` Gaussians over a picture, denser in its middle, in depth order as they come.
+/// A frame of `count` Gaussians over a picture, denser in its middle, in the order of their generation, which is depth
+/// order.
 pub fn gaussians(size: [u32; 2], count: usize, seed: u64) -> FrameWork {
     let mut chance = Chance(seed);
     let [width, height] = size.map(f64::from);
@@ -104,7 +105,7 @@ pub fn gaussians(size: [u32; 2], count: usize, seed: u64) -> FrameWork {
     }
 }
 
-/// Tiles of a side that the square around a Gaussian touches.
+/// The number of tiles, `side` pixels wide, that the square around a Gaussian touches.
 fn boxed(g: &Round, reach: f64, side: f64, size: [f64; 2]) -> u64 {
     let along = |axis: usize| {
         let low = (g.mean[axis] - reach).max(0.0);
@@ -118,7 +119,7 @@ fn boxed(g: &Round, reach: f64, side: f64, size: [f64; 2]) -> u64 {
     along(0) * along(1)
 }
 
-/// Whether a Gaussian reaches a pixel centre's rectangle, a square of `side` pixels.
+/// True if a Gaussian reaches the pixel centres of a square of `side` pixels.
 fn reaches(g: &Round, corner: [f64; 2], side: f64) -> bool {
     let square: f64 = [0, 1]
         .map(|axis| {
@@ -131,7 +132,7 @@ fn reaches(g: &Round, corner: [f64; 2], side: f64) -> bool {
     square < g.reach * g.reach
 }
 
-/// What is done in a tile.
+/// The work in a tile.
 fn tile(all: &[Round], at: [u32; 2]) -> TileWork {
     const BLOCKS: usize = TILE_GROUPS as usize;
     let corner = at.map(|at| f64::from(at * TILE_SIDE));
@@ -139,7 +140,7 @@ fn tile(all: &[Round], at: [u32; 2]) -> TileWork {
         .iter()
         .filter(|g| reaches(g, corner, f64::from(TILE_SIDE)))
         .collect();
-    // Block by block, then pixel by pixel; negative where it is finished.
+    // Transmittance of each block's pixels; negative if a pixel is finished.
     let mut transmittance = [[1.0f64; 16]; BLOCKS];
     let mut work = TileWork {
         at,
@@ -185,7 +186,7 @@ fn tile(all: &[Round], at: [u32; 2]) -> TileWork {
     work
 }
 
-/// Blends a Gaussian into a block; returns to how many pixels it contributed.
+/// Blends a Gaussian into a block. Returns the number of pixels to which it contributed.
 fn blend(g: &Round, place: [f64; 2], block: &mut [f64; 16]) -> u64 {
     let [floor, ceiling, least] = THRESHOLDS;
     let mut contributions = 0;
@@ -218,7 +219,7 @@ mod tests {
         let draw = &frame.draws[0];
         assert_eq!(draw.tiles.len(), 60);
         assert!(draw.sized_pairs.is_sorted_by(|a, b| a > b));
-        // Exact tests find fewer than boxes do.
+        // Exact tests find fewer pairs than boxes do.
         assert!(draw.pairs() < draw.sized_pairs[1]);
         assert!(draw.needed_pairs() < draw.pairs());
         let evaluations = Saturation::ALL.map(|saturation| draw.evaluations(saturation, false));

@@ -1,4 +1,5 @@
-//! How the paper's machine depends on its numbers: sweeps over a generated scene, and where they stop paying.
+//! The sensitivity of the paper's configuration to its numbers: sweeps over a generated scene, and the points from
+//! which a larger number brings little.
 
 use crate::chart::{self, Chart, Corner, Curve, Mark};
 use crate::scene;
@@ -12,31 +13,31 @@ const SIZE: [u32; 2] = [640, 360];
 const GAUSSIANS: usize = 90_000;
 const SEED: u64 = 1;
 
-/// A machine of a sweep, and what came of it.
+/// A configuration of a sweep, and its simulation.
 #[derive(Clone, Debug)]
 pub struct Point {
     /// The number that is swept.
     pub x: f64,
-    /// What it is called.
+    /// The name of the configuration.
     pub name: String,
-    /// The scene on this machine.
+    /// The simulation of the scene on this configuration.
     pub simulation: Simulation,
 }
 
-/// One number, swept.
+/// A sweep over one number.
 #[derive(Clone, Debug)]
 pub struct Sweep {
     /// The plot's file, without its extension.
     pub file: &'static str,
     /// A heading.
     pub title: &'static str,
-    /// What the number is.
+    /// The name of the number.
     pub axis: &'static str,
-    /// The machines, in order of the number.
+    /// The configurations, in order of the number.
     pub points: Vec<Point>,
-    /// The paper's number.
+    /// The number in the paper's configuration.
     pub paper: f64,
-    /// Why the curve is as it is.
+    /// The reason for the curve's shape.
     pub why: String,
 }
 
@@ -45,12 +46,12 @@ pub fn frame() -> FrameWork {
     scene::gaussians(SIZE, GAUSSIANS, SEED)
 }
 
-/// From what share of proportional growth on a further step pays.
+/// The least gain of a useful step, as a share of the gain if speed grew in proportion to the number.
 const PAYS: f64 = 0.25;
 
 impl Sweep {
-    /// The first point from which the next step brings less than a quarter of what it would if speed grew with the
-    /// number.
+    /// The first point from which the next step brings less than a quarter of the gain that it would if speed grew in
+    /// proportion to the number.
     pub fn knee(&self) -> Option<&Point> {
         let pays = |pair: &[Point]| {
             let speed = |point: &Point| point.simulation.raster_speedup;
@@ -61,7 +62,7 @@ impl Sweep {
         first.map(|pair| &pair[0])
     }
 
-    /// The raster stage's and the frame's speed-up as a picture.
+    /// A picture of the raster stage's and the frame's speed-up.
     pub fn svg(&self) -> String {
         let curve = |label, color, of: fn(&Simulation) -> f64| Curve {
             label,
@@ -99,7 +100,7 @@ fn machine(settings: &[String]) -> Result<Config, ConfigError> {
     Config::preset(DEFAULT_PRESET, settings)
 }
 
-/// The scene on machines that differ in one field.
+/// The scene on configurations that differ in one field.
 fn points(frame: &FrameWork, field: &str, values: &[f64]) -> Result<Vec<Point>, ConfigError> {
     let point = |&x: &f64| {
         let config = machine(&[format!("{field}={x}")])?;
@@ -114,8 +115,7 @@ fn points(frame: &FrameWork, field: &str, values: &[f64]) -> Result<Vec<Point>, 
 
 /// All sweeps over the scene.
 ///
-/// # Errors
-/// [`ConfigError`] if a preset cannot be read.
+/// # Errors Returns a [`ConfigError`] if a preset can't be read.
 pub fn sweeps(frame: &FrameWork) -> Result<Vec<Sweep>, ConfigError> {
     let paper = machine(&[])?;
     Ok(vec![
@@ -127,7 +127,7 @@ pub fn sweeps(frame: &FrameWork) -> Result<Vec<Sweep>, ConfigError> {
     ])
 }
 
-/// GB/s that a module moves while its PEs are busy: primitives in, and pixels out in the scene's proportion.
+/// GB/s that a module needs to keep its PEs busy: primitives read, and pixels written in the scene's proportion.
 fn appetite(config: &Config, result: &Simulation) -> f64 {
     let raster = &config.rasterizer;
     let cycles = f64::from(raster.tile_side.pow(2)) / f64::from(raster.pes_per_module);
@@ -306,10 +306,9 @@ fn precision(frame: &FrameWork) -> Result<Sweep, ConfigError> {
     })
 }
 
-/// The document.
+/// The text of SENSITIVITY.md.
 ///
-/// # Errors
-/// [`ConfigError`] if a preset cannot be read.
+/// # Errors Returns a [`ConfigError`] if a preset can't be read.
 pub fn markdown() -> Result<String, ConfigError> {
     let frame = frame();
     let draw = &frame.draws[0];

@@ -1,19 +1,19 @@
-//! The paper's baseline as a SIMT machine: stage 3 of the original 3DGS code on shader cores, a block of 256 threads for each
-//! tile, in warps of 32 that wait for their slowest lane. It is fixed by published microarchitecture and by the steps of the
-//! code's kernel, and no time of the paper's enters it; [`MACHINE`] says what each number's source is.
+//! The paper's baseline as a SIMT machine: stage 3 of the original 3DGS code on shader cores. A tile is a block of 256
+//! threads, in warps of 32 that wait for their slowest lane. The inputs are published microarchitecture and the steps
+//! of the code's kernel, and none of the paper's times; [`MACHINE`] gives the source of each number.
 
 use serde::Serialize;
 use timing::config::Config;
 use timing::work::{DrawWork, FrameWork, Mode, Run, TILE_SIDE, TileWork};
 
-/// A number of the machine, and who says it.
+/// A number of the machine, with its source.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Parameter {
     /// Its name.
     pub name: &'static str,
     /// Its value.
     pub value: f64,
-    /// Where it comes from; "assumed" where nobody says it.
+    /// Its source; "assumed" if there is none.
     pub source: &'static str,
 }
 
@@ -98,7 +98,7 @@ const COLOR_BYTES: Parameter = parameter(
     "the original 3DGS code reads 12 bytes where a warp blends; a sector has 32 (NVIDIA's profiler's documentation)",
 );
 
-/// The machine's numbers. SMs, clock and bandwidth are the preset's.
+/// The machine's numbers. The preset gives the number of SMs, clock and bandwidth.
 pub const MACHINE: [Parameter; 16] = [
     SCHEDULERS,
     WARP,
@@ -123,46 +123,46 @@ const WARPS_OF_A_BLOCK: Parameter = parameter(
     "the original 3DGS code: 16x16 threads, so that a warp is two rows of a tile",
 );
 
-/// What stage 3 took.
+/// The time of stage 3.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Simt {
     /// Milliseconds of all blocks.
     pub compute_ms: f64,
-    /// Of those, beyond what SMs that never ran out of blocks would have taken.
+    /// The part of `compute_ms` in which some SMs have run out of blocks.
     pub tail_ms: f64,
     /// Milliseconds of main memory.
     pub memory_ms: f64,
-    /// Warps and Gaussians evaluated together.
+    /// Pairs of a warp and a Gaussian that were evaluated.
     pub warps: f64,
-    /// The share of those in which a lane blends.
+    /// The share of those pairs in which a lane blends.
     pub blended: f64,
 }
 
 impl Simt {
-    /// Milliseconds.
+    /// Milliseconds of stage 3.
     pub fn milliseconds(&self) -> f64 {
         self.compute_ms.max(self.memory_ms)
     }
 }
 
-/// A block's work.
+/// The work of a block.
 #[derive(Clone, Copy, Debug, Default)]
 struct Block {
-    /// Cycles of an SM that it has to itself as far as issue slots go.
+    /// Cycles of the block alone on an SM, as limited by the rates of its units.
     cycles: f64,
-    /// Cycles that it takes at least, however few others there are.
+    /// The least cycles of the block, as limited by its latencies.
     least: f64,
     warps: f64,
     blended: f64,
 }
 
-/// Warps with an unfinished lane: neighbouring rows are taken to finish together, which is a lower bound.
+/// Warps with an unfinished lane. Neighbouring rows are taken to finish together, which is a lower bound.
 fn open_warps(run: &Run) -> f64 {
     f64::from(run.rows.div_ceil(2))
 }
 
 /// The share of open warps in which a primitive reaches a pixel. Blocks of 4x4 pixels that it reaches are taken to be a
-/// square, of which each row is two warps. An estimate, for the trace tells of blocks and not of rows.
+/// square, of which each row is two warps. It is an estimate, because the trace has blocks and not rows.
 fn blending(run: &Run) -> f64 {
     let primitives = f64::from(run.primitives.max(1));
     let blocks = f64::from(run.reached + run.hidden_blocks) / primitives;
@@ -178,24 +178,24 @@ impl Block {
             block.warps += warps;
             block.blended += warps * blending(run);
         }
-        // All threads take part in a batch, and a block ends with its batch.
+        // All threads take part in a batch, and a block ends only after a batch.
         let batches = (f64::from(tile.needed()) / BATCH.value).ceil();
         let instructions = block.warps * SKIPPED.value
             + block.blended * BLENDED.value
             + batches * WARPS_OF_A_BLOCK.value * BATCH_INSTRUCTIONS.value;
         let issue = instructions / SCHEDULERS.value;
         let special = block.warps * WARP.value / SPECIAL.value;
-        // Two loads from shared memory, and where a lane blends three more and an index.
+        // Two loads from shared memory; if a lane blends, three more and an index.
         let loads = (2.0 * block.warps + 4.0 * block.blended) * WARP.value / LOAD_STORE.value;
         block.cycles = issue.max(special).max(loads);
-        // Each warp alone issues once in so many cycles.
+        // A warp issues at most one instruction in `DEPENDENT` cycles.
         block.least =
             instructions / WARPS_OF_A_BLOCK.value * DEPENDENT.value + batches * BATCH_LATENCY.value;
         block
     }
 }
 
-/// Stage 3 of a frame's Gaussians.
+/// The time of stage 3 of a frame's Gaussians.
 pub fn simulate(frame: &FrameWork, config: &Config) -> Simt {
     let draws = || {
         frame
@@ -224,10 +224,10 @@ pub fn simulate(frame: &FrameWork, config: &Config) -> Simt {
     }
 }
 
-/// Bytes of a draw that come from main memory or go there.
+/// Bytes of a draw that are read from main memory or written to it.
 fn bytes(draw: &DrawWork) -> f64 {
     let needed = draw.needed_pairs() as f64;
-    // What is read again hits L2 as far as all that is drawn fits.
+    // Repeated reads hit the L2 cache as far as all drawn Gaussians fit in it.
     let set = draw.drawn as f64 * (GAUSSIAN_BYTES.value + COLOR_BYTES.value);
     let again = (needed - draw.drawn as f64).max(0.0);
     let misses = again * (1.0 - CACHE.value / set.max(CACHE.value));
@@ -238,10 +238,11 @@ fn bytes(draw: &DrawWork) -> f64 {
         + pixels * 20.0
 }
 
-/// Cycles until all blocks have ended. A block goes to the first SM with room; those in an SM share its issue slots.
+/// Cycles until all blocks have ended. A block goes to the first SM with a free slot; those on an SM share its issue
+/// slots.
 fn schedule(blocks: &[Block], sms: usize) -> f64 {
     let mut waiting = blocks.iter();
-    // Of each block in an SM: cycles left of its share and of its own pace.
+    // For each block on an SM: the cycles left of its share of the SM, and of its least cycles.
     let mut resident: Vec<Vec<[f64; 2]>> = vec![Vec::new(); sms];
     let mut now = 0.0;
     loop {
@@ -258,7 +259,7 @@ fn schedule(blocks: &[Block], sms: usize) -> f64 {
             };
             resident[place].push([block.cycles, pace]);
         }
-        // A block's pace is its share of the SM, or its own if that is slower.
+        // The pace of a block is its share of the SM, or its own if that is slower.
         let slowness = |blocks: &[[f64; 2]], pace: f64| pace.max(blocks.len() as f64);
         let ends = resident.iter().flat_map(|blocks| {
             let until = |[left, pace]: &[f64; 2]| left * slowness(blocks, *pace);
@@ -293,7 +294,7 @@ mod tests {
         let mut frame = even_frame([320, 320], 400_000, 0.2);
         let whole = simulate(&frame, &config());
         assert!((whole.warps - 8.0 * 400_000.0).abs() < 1e-6);
-        // Half of the rows finish, one of each two: the warps go on.
+        // Half of the rows finish, one of each two: all warps continue.
         let set = |frame: &mut FrameWork, rows| {
             for tile in &mut frame.draws[0].tiles {
                 tile.runs[0].rows = rows;

@@ -1,5 +1,5 @@
-//! The cycle-stepped model: every module's fetch engine, buffers and PEs, one clock cycle at a time. Slow, simple, and
-//! what the closed form is held against.
+//! The cycle-stepped model: every module's fetch engine, buffers and PEs, one clock cycle at a time. It is slow and
+//! simple, and the reference for the fast model.
 
 use std::collections::VecDeque;
 use timing::config::Config;
@@ -7,7 +7,7 @@ use timing::plan::{self, Part, Rates, Task};
 use timing::raster::{ModuleCycles, RasterReport};
 use timing::work::{FrameWork, Mode};
 
-/// Rasterizes a frame, cycle by cycle, while others move `others_gb_s` to and from main memory.
+/// Rasterizes a frame, cycle by cycle, while other units move `others_gb_s` to and from main memory.
 pub fn rasterize(frame: &FrameWork, config: &Config, others_gb_s: f64) -> RasterReport {
     let tasks = plan::tasks(frame, &config.rasterizer);
     let rates = Rates::new(config, others_gb_s);
@@ -29,7 +29,7 @@ pub fn rasterize(frame: &FrameWork, config: &Config, others_gb_s: f64) -> Raster
         for module in &mut modules {
             module.step(config, &mut report.modules);
         }
-        // The arbiter serves every port that asks alike.
+        // The arbiter gives every requesting port the same share.
         let asking = modules
             .iter()
             .filter(|module| module.wants_memory())
@@ -53,41 +53,41 @@ pub fn rasterize(frame: &FrameWork, config: &Config, others_gb_s: f64) -> Raster
 #[derive(Clone, Debug)]
 struct Batch {
     mode: Mode,
-    /// Groups of 16 pixels of each primitive; empty if the batch was fetched in vain.
+    /// The groups of 16 pixels of each primitive; empty if the batch was fetched and is then discarded.
     groups: Vec<Groups>,
     bytes: f64,
     first_of_part: bool,
     first_of_tile: bool,
     last_of_tile: bool,
-    /// The fetch could not be foreseen: its latency shows.
+    /// True if the fetch could not be made ahead, so that the module waits for its latency.
     cold: bool,
 }
 
-/// Groups of 16 pixels of a primitive.
+/// The groups of 16 pixels of a primitive.
 #[derive(Clone, Copy, Debug)]
 struct Groups {
-    /// Those in which it is evaluated.
+    /// The number of groups in which it is evaluated.
     evaluated: u64,
-    /// Those among which these are.
+    /// The number of groups in which it may be evaluated.
     open: u64,
 }
 
-/// What a port moves, in order.
+/// A transfer of a port. A port does its transfers in order.
 #[derive(Debug)]
 struct Request {
     latency: u32,
     bytes: f64,
-    /// What is fetched, or nothing for a write.
+    /// The fetched batch; None for a write.
     batch: Option<Batch>,
 }
 
-/// What the PEs are at.
+/// The state of the PEs.
 #[derive(Debug)]
 struct Computation {
     batch: Batch,
-    /// Primitives begun.
+    /// The number of primitives begun.
     next: usize,
-    /// Cycles left of each kind, in this order.
+    /// The cycles left of each kind, spent in this order.
     switch: u32,
     controller: u32,
     busy: u64,
@@ -96,10 +96,10 @@ struct Computation {
 
 #[derive(Debug, Default)]
 struct Module {
-    /// Batches claimed and not asked for.
+    /// Batches that are claimed but not requested.
     claimed: VecDeque<Batch>,
     port: VecDeque<Request>,
-    /// Batches in a buffer, not begun.
+    /// Batches in a buffer that have not begun.
     ready: VecDeque<Batch>,
     computing: Option<Computation>,
     mode: Option<Mode>,
@@ -112,7 +112,7 @@ struct Module {
 }
 
 impl Module {
-    /// Asks for the next batch as soon as half of the tile buffer is free.
+    /// Requests the next batch as soon as half of the tile buffer is free.
     fn claim<'a>(
         &mut self,
         queue: &mut impl Iterator<Item = &'a Task>,
@@ -199,7 +199,7 @@ impl Module {
             if batch.last_of_tile {
                 let latency = config.rasterizer.latency(batch.mode);
                 let bytes = f64::from(config.rasterizer.tile_bytes());
-                // The last pixels must leave the pipeline first.
+                // The last pixels must leave the pipeline before they are written.
                 self.ended = Some(Request {
                     latency,
                     bytes,
@@ -223,7 +223,7 @@ impl Module {
                 return;
             }
             if batch.groups.is_empty() {
-                // Fetched in vain: the buffer is free again at once.
+                // The batch is discarded: the buffer is free again at once.
                 continue;
             }
             let raster = &config.rasterizer;
@@ -301,7 +301,7 @@ impl Computation {
     }
 }
 
-/// Cuts a tile's lists into batches.
+/// Divides a tile's lists into batches.
 fn batches(
     task: &Task,
     config: &Config,
@@ -330,7 +330,7 @@ fn batches(
             });
         }
         if left > 0 {
-            // The next batch was asked for before the tile was found to be finished.
+            // The next batch was requested before the tile was found to be finished.
             let bytes = f64::from(left.min(raster.batch) * raster.primitive_bytes());
             report.bytes_wasted += bytes;
             *after_waste = true;
@@ -356,7 +356,7 @@ fn batches(
     out
 }
 
-/// Groups of 16 pixels of each primitive: a segment's are spread evenly.
+/// The groups of 16 pixels of each primitive: those of a segment are spread evenly.
 fn groups_of_each(part: &Part) -> Vec<Groups> {
     let mut out = Vec::with_capacity(part.needed as usize);
     for segment in &part.segments {

@@ -1,7 +1,7 @@
-//! What skipping would bring as hardware: the same frame on the same machine, with each skip of the device added to
-//! those before it: exact tile tests instead of squares, lists that end with their tile, then finished rows and blocks,
-//! exact block tests; for triangles the blocks that they cover instead of whole tiles; and hierarchical depth. Or each
-//! alone.
+//! The gain of skipping work in hardware: the same frame on the same configuration, with each skip of the device added
+//! to those before it. The skips are exact tile tests instead of squares; lists that end with their tile, then finished
+//! rows and blocks; exact block tests; for triangles the blocks that they cover instead of whole tiles; and
+//! hierarchical depth. Each skip is also simulated alone.
 
 use serde::Serialize;
 use timing::config::{Config, Lists};
@@ -11,13 +11,13 @@ use timing::work::{FrameWork, Mode, Saturation};
 /// A variant of the hardware or of the work that reaches it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct WhatIf {
-    /// What is different.
+    /// The name of the variant.
     pub name: &'static str,
-    /// What comes of it.
+    /// The simulation of the variant.
     pub simulation: Simulation,
 }
 
-/// What a machine skips.
+/// The skips of a configuration.
 #[derive(Clone, Copy)]
 struct Skipping {
     saturation: Saturation,
@@ -26,7 +26,7 @@ struct Skipping {
 }
 
 impl Skipping {
-    /// Finished pixels of Gaussian lists.
+    /// The skip of finished pixels of Gaussian lists, and no other.
     fn of(saturation: Saturation) -> Self {
         Self {
             saturation,
@@ -35,10 +35,10 @@ impl Skipping {
         }
     }
 
-    /// A frame on a machine that skips this.
+    /// Simulates a frame on a configuration with these skips.
     fn simulate(self, name: &'static str, frame: &FrameWork, config: &Config) -> WhatIf {
         let mut config = config.clone();
-        // The frame has the lists that are asked about.
+        // The frame already has the variant's lists.
         config.rasterizer.lists = Lists::Exact;
         config.rasterizer.saturation = self.saturation;
         config.rasterizer.triangle_traversal = self.traversal;
@@ -50,7 +50,7 @@ impl Skipping {
     }
 }
 
-/// What of a frame there is to skip.
+/// The kinds of work in a frame that can be skipped.
 struct Kinds {
     gaussians: bool,
     triangles: bool,
@@ -99,7 +99,7 @@ pub fn what_ifs(frame: &FrameWork, config: &Config) -> Vec<WhatIf> {
             ),
         ]);
     }
-    // With Gaussians this is that of triangles in whole tiles, too.
+    // With Gaussians, this is the variant of triangles in whole tiles, too.
     let blocks = if kinds.gaussians {
         "exact tile and block tests, blocks saturate"
     } else {
@@ -127,8 +127,8 @@ pub fn what_ifs(frame: &FrameWork, config: &Config) -> Vec<WhatIf> {
     variants
 }
 
-/// Each skip by itself on a machine that bins squares of 3 sigma, ends the lists of tiles that are finished, evaluates
-/// whole tiles and knows no depths but those of pixels: the first variant.
+/// Each skip alone, on a machine without the others. That machine uses the lists of 3-sigma squares, ends the lists of
+/// finished tiles, evaluates whole tiles, and has no hierarchical depth: it is the first variant of [`what_ifs`].
 pub fn each_alone(frame: &FrameWork, config: &Config) -> Vec<WhatIf> {
     let kinds = Kinds::of(frame);
     let (squares, plain) = (frame.with_squares(), Skipping::of(Saturation::Tile));
@@ -223,7 +223,7 @@ mod tests {
         let alone = cycles(each_alone(&frame, &config));
         let together = cycles(what_ifs(&frame, &config));
         assert_eq!((alone.len(), together.len()), (6, 9));
-        // The second of those that are added has what the first alone has.
+        // The second of the cumulative variants has only the first skip, and so equals the first skip alone.
         assert_eq!(alone[0], together[1]);
         let last = together[together.len() - 1];
         assert!(

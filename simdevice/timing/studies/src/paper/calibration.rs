@@ -1,9 +1,9 @@
-//! Predicting a scene's raster time from its baseline, calibrated on the other six.
+//! Predictions of a scene's raster time from its baseline, calibrated on the other six scenes.
 
 use super::numbers::{SCENES, Scene};
 use timing::work::TILE_SIDE;
 
-/// A model of GauRast's raster time in ms: a constant per feature of a scene.
+/// A model of GauRast's raster time in ms, with a constant for each feature of a scene.
 pub struct Model {
     pub name: &'static str,
     pub features: fn(&Scene) -> Vec<f64>,
@@ -14,7 +14,7 @@ fn tiles(scene: &Scene) -> f64 {
     columns * rows * 1e-3
 }
 
-/// The null model first.
+/// The models; the null model is the first.
 pub const MODELS: [Model; 3] = [
     Model {
         name: "baseline / constant (null)",
@@ -30,7 +30,7 @@ pub const MODELS: [Model; 3] = [
     },
 ];
 
-/// The scene's predicted ms, from the six others.
+/// The predicted raster time of a scene in ms, calibrated on the six others.
 pub fn leave_one_out(model: &Model, left_out: usize) -> f64 {
     let others: Vec<_> = (0..SCENES.len())
         .filter(|&index| index != left_out)
@@ -61,13 +61,13 @@ pub fn leave_one_out(model: &Model, left_out: usize) -> f64 {
     features.iter().zip(weights).map(|(f, w)| f * w).sum()
 }
 
-/// Mean relative error of a model over the scenes.
+/// The mean relative error of a model over the scenes.
 pub fn mean_error(model: &Model) -> f64 {
     let error = |index: usize| (leave_one_out(model, index) / SCENES[index].gaurast_ms - 1.0).abs();
     (0..SCENES.len()).map(error).sum::<f64>() / SCENES.len() as f64
 }
 
-/// Mean relative error of the null model with one constant of all scenes, the ratio of the sums.
+/// The mean relative error of the null model if one constant, the ratio of the sums, is used for all scenes.
 pub fn fitted_error() -> f64 {
     let sum = |of: fn(&Scene) -> f64| SCENES.iter().map(of).sum::<f64>();
     let constant = sum(|s| s.baseline_ms) / sum(|s| s.gaurast_ms);
@@ -85,7 +85,7 @@ mod tests {
 
     #[test]
     fn the_null_models_error() {
-        // Sums of all seven: 1570 / 68.6 = 22.9, whose mean error is 6.6 %; leaving one out can only be worse.
+        // Sums of all seven: 1570 / 68.6 = 22.9, with a mean error of 6.6 %; leaving one out can only be worse.
         let error = sum_of_errors(1570.0 / 68.6) / 7.0;
         assert!((error - fitted_error()).abs() < 1e-9);
         assert!((error - 0.066).abs() < 0.001, "{error}");

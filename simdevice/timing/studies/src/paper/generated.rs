@@ -1,4 +1,4 @@
-//! Pairs of generated scenes beside those that the published times imply.
+//! Pairs of generated scenes compared with those that the published times imply.
 
 use super::numbers::{SCENES, implied_pairs};
 use super::table::{Label, Row, Section};
@@ -7,7 +7,7 @@ use timing::config::Config;
 use timing::fast;
 use timing::simulate::even_frame;
 
-/// What `samples/examples/paper_scenes.rs` writes.
+/// The measurements that `samples/examples/paper_scenes.rs` writes.
 const MEASURED: &str = include_str!("../../generated_scenes.toml");
 
 #[derive(Deserialize)]
@@ -19,13 +19,13 @@ struct Measured {
 #[derive(Deserialize)]
 struct Scene {
     name: String,
-    /// The scene whose camera path was taken.
+    /// The scene whose camera path was used.
     path: String,
     gaussians: u64,
     size: [u32; 2],
     /// Pairs of a tile and a Gaussian.
     pairs: u64,
-    /// Of those, taken before the tile was finished.
+    /// Pairs that were fetched before the tile was finished.
     needed: u64,
     /// Pairs of a 4x4 block and a Gaussian that was evaluated there.
     blocks: u64,
@@ -33,7 +33,7 @@ struct Scene {
     drawn: u64,
 }
 
-/// None if there are no measurements, or they or the presets cannot be read.
+/// The section. None if there are no measurements, or they or the presets can't be read.
 pub fn section() -> Option<Section> {
     let measured: Measured = toml::from_str(MEASURED).ok()?;
     let config = Config::preset("paper-15x16", &[]).ok()?;

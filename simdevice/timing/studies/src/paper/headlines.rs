@@ -1,4 +1,4 @@
-//! The paper's headlines: what they imply, how they fit together, and what the model says.
+//! The paper's headline numbers: their consequences, their consistency, and the model's values.
 
 use super::numbers::{
     AREA_RATIO, AREA_SOC, BASELINE_FPS, FPS, GSCORE_MM2, GSCORE_RATIO, M2_RATE, M2_SPEEDUP,
@@ -58,7 +58,7 @@ fn raster() -> Section {
     }
 }
 
-/// Frames per second that the schedule model gives stages.
+/// Frames per second of the schedule model for stages 1-2 and stage 3 of these milliseconds.
 fn fps(before: f64, raster: f64, collaborative: bool) -> f64 {
     let stages = Stages {
         preprocess: before,
@@ -76,7 +76,7 @@ fn fps(before: f64, raster: f64, collaborative: bool) -> f64 {
 fn schedules() -> Section {
     let (baseline, ours) = (mean(|s| s.baseline_ms), mean(|s| s.gaurast_ms));
     let mut rows = Vec::new();
-    // Pipelined: stages 1-2 are the frame.
+    // If pipelined, stages 1-2 are the frame.
     let before = 1e3 / FPS[0];
     let pace = fps(before, ours, true);
     rows.push(
@@ -121,7 +121,7 @@ fn schedules() -> Section {
         )
         .note("mean scene"),
     );
-    // Serial: (s + baseline) / (s + ours) is the speed-up.
+    // If serial, (s + baseline) / (s + ours) is the speed-up.
     let before = (baseline - SPEEDUP[0] * ours) / (SPEEDUP[0] - 1.0);
     rows.push(
         Row::new(
@@ -362,7 +362,7 @@ fn m2_rates() -> Result<Vec<Row>, ConfigError> {
     ])
 }
 
-/// None if the presets cannot be read.
+/// The section about areas. None if the presets can't be read.
 fn areas() -> Option<Section> {
     let config = Config::preset("paper-15x16", &[]).ok()?;
     let area = area::area(&config);

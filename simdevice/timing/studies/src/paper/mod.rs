@@ -1,5 +1,5 @@
-//! The paper's evaluation beside the model's: every number has a row that says whether it went in, was calibrated, was
-//! solved for or is predicted. Where the paper's numbers do not fit together, the arithmetic says so.
+//! The paper's evaluation compared with the model's. Every number has a row that says whether it is an input,
+//! calibrated, solved or predicted. If the paper's numbers contradict each other, the report shows the arithmetic.
 
 mod calibration;
 mod generated;
@@ -12,7 +12,7 @@ mod table;
 
 pub use table::{Label, Row, Section};
 
-/// The whole report: what is predicted first, then what is solved and calibrated, then what goes in.
+/// The whole report: predicted numbers first, then solved and calibrated ones, then the inputs.
 pub fn report() -> Vec<Section> {
     let mut sections: Vec<_> = predicted::section().into_iter().collect();
     sections.push(scenes::left_out());

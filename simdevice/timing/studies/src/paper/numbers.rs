@@ -1,4 +1,4 @@
-//! What the paper's evaluation says.
+//! The numbers of the paper's evaluation.
 
 use super::table::{Label, Row, Section};
 use timing::work::TILE_PIXELS;
@@ -49,7 +49,7 @@ pub fn mean(of: impl Fn(&Scene) -> f64) -> f64 {
     SCENES.iter().map(of).sum::<f64>() / SCENES.len() as f64
 }
 
-/// Pairs of a tile and a Gaussian that so many PEs work off in a time, one evaluation each per cycle.
+/// Pairs of a tile and a Gaussian that `pes` PEs evaluate in a time, at one evaluation each per cycle.
 pub fn implied_pairs(milliseconds: f64, pes: f64, clock_ghz: f64) -> f64 {
     milliseconds * clock_ghz * 1e6 * pes / f64::from(TILE_PIXELS)
 }
@@ -66,7 +66,7 @@ pub const RASTER_ENERGY: [f64; 2] = [24.0, 22.0];
 /// End-to-end speed-up and FPS, 3DGS and Mini-Splatting.
 pub const SPEEDUP: [f64; 2] = [6.0, 4.0];
 pub const FPS: [f64; 2] = [24.0, 46.0];
-/// Share of the baseline frame that stage 3 takes, at least.
+/// The least share of the baseline frame that stage 3 takes.
 pub const RASTER_SHARE: f64 = 0.8;
 /// FPS of the baseline.
 pub const BASELINE_FPS: [f64; 2] = [2.0, 5.0];
@@ -80,7 +80,7 @@ pub const GSCORE_RATIO: f64 = 24.7;
 pub const M2_RATE: f64 = 2.6;
 pub const M2_SPEEDUP: f64 = 11.2;
 
-/// What goes in.
+/// The section of the inputs.
 pub fn inputs() -> Section {
     let rows = vec![
         Row::input("PEs of a module", "16"),

@@ -8,13 +8,14 @@ use timing::simulate::{Simulation, even_frame, simulate};
 use timing::stages::{self, GaussianCounts};
 use timing::work::{FrameWork, TILE_SIDE};
 
-/// Pairs that are listed and sorted over those that are needed until a tile is finished: nobody says how many there are.
+/// The ratio of listed and sorted pairs to those needed before a tile is finished, least and greatest. It is not
+/// published.
 const BAND: [f64; 2] = [1.0, 1.5];
 
 /// Degree of the published models' spherical harmonics.
 const DEGREE: u32 = 3;
 
-/// A scene's frame: the pairs that its time implies, spread evenly, of lists that are `listed` times as long.
+/// A scene's frame: the pairs that its time implies, spread evenly, in lists that are `listed` times as long.
 pub fn frame(scene: &Scene, listed: f64, config: &Config) -> FrameWork {
     let raster = &config.rasterizer;
     let needed = implied_pairs(scene.gaurast_ms, f64::from(raster.pes()), raster.clock_ghz) as u64;
@@ -40,7 +41,7 @@ pub fn frame(scene: &Scene, listed: f64, config: &Config) -> FrameWork {
     frame
 }
 
-/// A scene whose rasterizer takes no time.
+/// The frame rates of a scene whose rasterizer takes no time.
 struct Bound {
     before_ms: f64,
     fps: f64,
@@ -62,8 +63,9 @@ fn mean(values: impl Iterator<Item = f64>) -> f64 {
     values.sum::<f64>() / SCENES.len() as f64
 }
 
-/// # Errors
-/// [`ConfigError`] if the preset cannot be read.
+/// The section of predicted frame rates and speed-ups.
+///
+/// # Errors Returns a [`ConfigError`] if the preset can't be read.
 pub fn section() -> Result<Section, ConfigError> {
     let config = Config::preset(DEFAULT_PRESET, &[])?;
     let mut rows = Vec::new();

@@ -9,14 +9,15 @@ use timing::config::{Config, ConfigError, DEFAULT_PRESET};
 use timing::shader_cores::roofline;
 use timing::work::FrameWork;
 
-/// # Errors
-/// [`ConfigError`] if the preset cannot be read.
+/// The sections about the SIMT machine, the traffic of sorting, and other ways to draw Gaussians.
+///
+/// # Errors Returns a [`ConfigError`] if the preset can't be read.
 pub fn sections() -> Result<[Section; 3], ConfigError> {
     let config = Config::preset(DEFAULT_PRESET, &[])?;
     Ok([baseline(&config), sorting(&config), others(&config)])
 }
 
-/// A scene's frame of which no warp blends, and of which each does.
+/// A scene's frame in two variants: no warp blends, and each warp does.
 fn both(scene: &Scene, config: &Config) -> [FrameWork; 2] {
     let all = frame(scene, 1.0, config);
     let mut none = all.clone();
@@ -26,7 +27,7 @@ fn both(scene: &Scene, config: &Config) -> [FrameWork; 2] {
     [none, all]
 }
 
-/// The mean of relative errors over the scenes' baselines.
+/// The mean relative error of predictions over the scenes' baselines.
 fn mean_error(predicted: impl Fn(usize) -> f64) -> f64 {
     let error = |index: usize| (predicted(index) / SCENES[index].baseline_ms - 1.0).abs();
     (0..SCENES.len()).map(error).sum::<f64>() / SCENES.len() as f64
@@ -41,7 +42,8 @@ fn mean_null(left_out: usize) -> f64 {
     others.map(|(_, scene)| scene.baseline_ms).sum::<f64>() / (SCENES.len() - 1) as f64
 }
 
-/// The line through the other scenes' times, GauRast's across and the baseline's up, by least squares.
+/// The prediction of a scene's baseline by a line, fitted by least squares to the other scenes' times: GauRast's to
+/// baseline.
 fn affine_null(left_out: usize) -> f64 {
     let others = || {
         let all = SCENES.iter().enumerate();

@@ -1,5 +1,5 @@
-//! The scenes' raster times: pairs that they imply, what the model makes of those, and the prediction of each scene from
-//! the others.
+//! The scenes' raster times: the pairs that they imply, the model's times for these, and the prediction of each scene
+//! from the others.
 
 use super::calibration::{MODELS, fitted_error, leave_one_out, mean_error};
 use super::numbers::{SCENES, implied_pairs, mean};
@@ -73,7 +73,7 @@ fn implied() -> Section {
     }
 }
 
-/// Two sections that need presets, or none if the presets cannot be read.
+/// The two sections that need presets. Empty if the presets can't be read.
 fn model_sections() -> Vec<Section> {
     model().unwrap_or_default()
 }
@@ -159,7 +159,7 @@ fn model() -> Result<Vec<Section>, ConfigError> {
     ])
 }
 
-/// Each scene predicted from the others.
+/// The section that predicts each scene from the others.
 pub fn left_out() -> Section {
     let mut rows = Vec::new();
     for model in &MODELS {

@@ -1,31 +1,31 @@
-//! A report's tables: rows of a number of the paper's and the model's.
+//! The tables of a report. A row compares a number of the paper with the model's.
 
 use serde::Serialize;
 
-/// Where a number comes from.
+/// The origin of a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Label {
-    /// The paper says it and the model uses it.
+    /// The paper gives it and the model uses it.
     Input,
-    /// Another source than the paper says it and the model uses it.
+    /// Another source than the paper gives it and the model uses it.
     Cited,
-    /// Nobody says it; the model needs it.
+    /// The model needs it, and no source gives it.
     Assumed,
-    /// A constant of the model was chosen so that it comes out.
+    /// A constant of the model was chosen to reproduce it.
     Calibrated,
     /// It follows from the paper's numbers by arithmetic.
     Solved,
-    /// The model says it without having been told.
+    /// The model computes it from other numbers.
     Predicted,
-    /// Of something else that resembles the paper's: it shows what could be, and is evidence of nothing.
+    /// A number of something similar to the paper's. It shows a possibility and proves nothing.
     Illustration,
-    /// It would need what is not at hand.
+    /// A test would need data that is not available.
     Untestable,
 }
 
 impl Label {
-    /// As in the tables.
+    /// The label's text in tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Input => "input",
@@ -43,17 +43,17 @@ impl Label {
 /// A number of the paper and the model's.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
-    /// What it is.
+    /// The name of the number.
     pub item: String,
-    /// What the paper says.
+    /// The paper's value.
     pub paper: String,
-    /// What the model says.
+    /// The model's value.
     pub model: String,
-    /// The difference, where both are numbers.
+    /// The difference, if both are numbers.
     pub difference: String,
-    /// Where the model's number comes from.
+    /// The origin of the model's value.
     pub label: Label,
-    /// How.
+    /// A note on how the value comes about.
     pub note: String,
 }
 
@@ -75,7 +75,7 @@ impl Row {
         }
     }
 
-    /// A row of two numbers, with as many decimals as are given.
+    /// A row of two numbers, with `decimals` decimals.
     pub fn numbers(
         item: impl Into<String>,
         unit: &str,
@@ -89,13 +89,13 @@ impl Row {
         row
     }
 
-    /// A number that goes in as it is.
+    /// A row of an input.
     pub fn input(item: impl Into<String>, value: impl Into<String>) -> Self {
         let value = value.into();
         Self::new(item, value.clone(), value, Label::Input)
     }
 
-    /// A number of the model's that the paper doesn't say.
+    /// A row of the model's number that the paper doesn't give.
     pub fn without_paper(
         item: impl Into<String>,
         value: impl Into<String>,
@@ -105,7 +105,7 @@ impl Row {
         Self::new(item, "", value, label).note(source)
     }
 
-    /// The row, with how its number comes about.
+    /// The row with a note on how its number comes about.
     pub fn note(mut self, note: impl Into<String>) -> Self {
         self.note = note.into();
         self
@@ -117,7 +117,7 @@ impl Row {
 pub struct Section {
     /// Its heading.
     pub title: &'static str,
-    /// What it shows.
+    /// Its introduction.
     pub text: String,
     /// Its rows.
     pub rows: Vec<Row>,

@@ -1,4 +1,4 @@
-//! The models of the hardware against each other, and the documents that are made of what they say.
+//! Tests of the hardware models against each other, and of the documents generated from their results.
 
 mod models;
 mod paper;

@@ -8,7 +8,7 @@ use timing::work::{DrawWork, Mode, Run, Saturation, TILE_SIDES, TileWork};
 use timing::{FrameWork, fast};
 use timing_studies::stepped;
 
-/// What a random trace is to press.
+/// The property that a random trace stresses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     Any,
@@ -24,7 +24,7 @@ const KINDS: [Kind; 4] = [
     Kind::ModeSwitching,
 ];
 
-/// A tile whose pixels finish little by little, or never.
+/// A tile whose pixels finish gradually, or never.
 fn tile(random: &mut ChaCha8Rng, at: [u32; 2], mode: Mode, largest: f64) -> TileWork {
     let listed = largest.powf(random.random::<f64>()).ceil().max(1.0) as u32;
     let saturates = mode == Mode::Gaussian && random.random_bool(0.5);
@@ -153,7 +153,7 @@ fn kinds() -> Vec<Variant> {
 
 #[gaurast_runner::test(each = kinds())]
 fn the_fast_model_is_within_2_percent_of_the_stepped_model(case: &Case) {
-    // Of all kinds together.
+    // The number of traces of all kinds together.
     const TRACES: usize = 10_000;
     let mut random = ChaCha8Rng::seed_from_u64(1);
     let mut errors = Vec::new();
@@ -167,7 +167,7 @@ fn the_fast_model_is_within_2_percent_of_the_stepped_model(case: &Case) {
         }
         let fast = fast::rasterize(&frame, &config, 0.0);
         let slow = stepped::rasterize(&frame, &config, 0.0);
-        // What was done is the same, whatever time it took.
+        // The work is the same in both models.
         assert_eq!(fast.gaussian_evaluations, slow.gaussian_evaluations);
         assert_eq!(fast.triangle_evaluations, slow.triangle_evaluations);
         assert_eq!(fast.bytes_out, slow.bytes_out);

@@ -1,4 +1,4 @@
-//! PAPER.md is generated, complete and up to date.
+//! Tests that PAPER.md is generated, complete and up to date.
 
 use timing_studies::paper::Label;
 
@@ -132,7 +132,7 @@ fn the_first_rows_are_predictions_and_say_how_far_off_they_are() {
         row.map(|row| row.model.clone())
             .unwrap_or_else(|| panic!("{item}"))
     };
-    // No rasterizer passes the bound.
+    // No rasterizer exceeds the bound.
     let number = |item: &str| cell(item).trim_end_matches('x').parse::<f64>().unwrap();
     for listed in ["1.0", "1.5"] {
         let paired = format!("{listed} listed a needed pair");

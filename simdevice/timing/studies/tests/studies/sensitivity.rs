@@ -1,4 +1,4 @@
-//! SENSITIVITY.md and its plots are generated and up to date.
+//! Tests that SENSITIVITY.md and its plots are generated and up to date.
 
 use timing_studies::sensitivity;
 

@@ -1,4 +1,4 @@
-//! The format of traces is documented field by field.
+//! Tests that the format of traces is documented field by field.
 
 use serde_json::Value;
 use std::collections::BTreeSet;
