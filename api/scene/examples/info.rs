@@ -1,4 +1,4 @@
-//! Prints what scene files hold, as JSON, one line each: `cargo run -p gaurast-scene --example info -- FILES`.
+//! Prints statistics of scene files as JSON, one line each: `cargo run -p gaurast-scene --example info -- FILES`.
 
 use std::process::ExitCode;
 

@@ -5,10 +5,10 @@ use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// The vertical field of view where none is given, in degrees.
+/// The default vertical field of view, in degrees.
 pub const DEFAULT_FOV: f64 = 50.0;
 
-/// How a camera projects.
+/// The projection model of a camera.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 pub enum Model {
     /// Perspective.
@@ -28,16 +28,16 @@ pub const DEFAULT_NEAR: f64 = 0.2;
 /// A camera with its picture's size.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 pub struct Camera {
-    /// How it projects.
+    /// The projection model.
     #[serde(default)]
     pub model: Model,
-    /// World to camera, row by row: the directions right, down and forward in the world.
+    /// The rotation from world to camera, row by row: the directions right, down and forward in the world.
     pub rotation: [[f64; 3]; 3],
     /// The camera's position in the world.
     pub eye: [f64; 3],
     /// Focal lengths along x and y, in pixels.
     pub focal: [f64; 2],
-    /// The point straight ahead, in pixels from the picture's upper left corner.
+    /// The principal point, in pixels from the picture's upper left corner.
     pub principal: [f64; 2],
     /// The picture's width in pixels.
     pub width: u32,
@@ -67,7 +67,7 @@ fn is_infinite(value: &f64) -> bool {
     value.is_infinite()
 }
 
-/// Why a camera given by hand is none.
+/// The reason that a camera's parameters are invalid.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
 pub enum CameraError {
     /// A number is infinite or not a number.
@@ -91,11 +91,10 @@ pub enum CameraError {
 }
 
 impl Camera {
-    /// A camera at `eye` that looks at `target`, with `up` upwards in the picture. `fov` is the
-    /// vertical field of view in degrees; `size` the picture's in pixels.
+    /// A camera at `eye` that looks at `target`, with `up` upwards in the picture. `fov` is the vertical field of view
+    /// in degrees; `size` is the picture's size in pixels.
     ///
-    /// # Errors
-    /// See [`CameraError`].
+    /// # Errors See [`CameraError`].
     pub fn look_at(
         eye: [f64; 3],
         target: [f64; 3],
@@ -145,7 +144,7 @@ impl Camera {
         }
     }
 
-    /// Checks that the camera can be drawn with: its numbers are finite, as the device's too, and its planes in order.
+    /// Checks that the camera can draw: its numbers are finite, also in binary32, and its planes are in order.
     ///
     /// # Errors
     /// [`CameraError::NotFinite`], [`CameraError::Focal`] or [`CameraError::Planes`].
@@ -178,7 +177,7 @@ impl Camera {
         Self { near, far, ..*self }
     }
 
-    /// The camera with the picture magnified about the point straight ahead.
+    /// The camera with the picture magnified about the principal point.
     #[must_use]
     pub fn zoomed(&self, factor: f64) -> Self {
         Self {
@@ -187,7 +186,8 @@ impl Camera {
         }
     }
 
-    /// A camera with the same axes and parallel rays, which shows what is `distance` ahead as large as a pinhole does.
+    /// An orthographic camera with the same axes, which shows objects `distance` ahead as large as a pinhole camera
+    /// does.
     #[must_use]
     pub fn orthographic(&self, distance: f64) -> Self {
         Self {
@@ -253,8 +253,8 @@ impl Camera {
         }
     }
 
-    /// `count` cameras evenly around the origin at a distance of 4, somewhat above it, that look
-    /// at it: a path for scenes that come without one.
+    /// `count` cameras evenly around the origin at a distance of 4, somewhat above it, that look at it: a default path
+    /// for scenes without cameras.
     pub fn orbit(count: usize, size: [u32; 2]) -> Vec<Self> {
         let eye = DVec3::new(0.0, -0.35, -1.0).normalize() * 4.0;
         let forward = -eye.normalize();
@@ -267,7 +267,8 @@ impl Camera {
             .collect()
     }
 
-    /// Where `point` of the world appears, in pixels, to a pinhole, if it is in front of the camera.
+    /// The position of a world point in the picture of a pinhole camera, in pixels. None if the point is not in front
+    /// of the camera.
     pub fn project(&self, point: [f64; 3]) -> Option<[f64; 2]> {
         let rotation = DMat3::from_cols_array_2d(&self.rotation).transpose();
         let t = rotation * (DVec3::from_array(point) - DVec3::from_array(self.eye));
@@ -279,7 +280,7 @@ impl Camera {
         })
     }
 
-    /// The camera as a draw takes it.
+    /// The camera as a Vulkan structure for draws.
     pub fn to_vulkan(&self) -> GaussianCameraGAURAST<'static> {
         let rotation = self.rotation.as_flattened();
         let model = match self.model {
@@ -323,7 +324,7 @@ mod tests {
         close(camera.project([2., 0., 0.]), [125., 50.]);
         assert_eq!(camera.project([0., 0., -5.]), None);
 
-        // Y-up world, from +z: x is right still, and up is up.
+        // Y-up world, seen from +z: x is still right, and y is up.
         let camera = Camera::look_at([1., 1., 5.], [1., 1., 0.], [0., 1., 0.], 90.0, [200, 100])
             .expect("a camera");
         close(camera.project([1., 1., 0.]), [100., 50.]);
@@ -396,7 +397,7 @@ mod tests {
         assert_eq!(cameras.len(), 7);
         for camera in &cameras {
             close(camera.project([0.; 3]), [32., 24.]);
-            // Up is up.
+            // A point above the horizon appears above it.
             let [_, y] = camera.project([0., -0.5, 0.]).expect("in front");
             assert!(y < 24.0);
             let rows = DMat3::from_cols_array_2d(&camera.rotation);

@@ -14,13 +14,13 @@ pub struct Keyframe {
     pub eye: [f64; 3],
     /// The point that it looks at.
     pub target: [f64; 3],
-    /// What is upwards in the picture.
+    /// The direction upwards in the picture.
     #[serde(default = "default_up")]
     pub up: [f64; 3],
     /// The vertical field of view in degrees.
     #[serde(default = "default_fov")]
     pub fov: f64,
-    /// When the camera is here; keyframes are a unit of time apart where none says.
+    /// The time at which the camera is here. Keyframes without times are one unit apart.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time: Option<f64>,
 }
@@ -34,7 +34,7 @@ fn default_fov() -> f64 {
 }
 
 impl Keyframe {
-    /// The keyframe of a camera that looks at what is `distance` ahead of it.
+    /// The keyframe of a camera that looks at a point `distance` ahead of it.
     pub fn of(camera: &Camera, distance: f64) -> Self {
         let [_, down, forward] = camera.rotation.map(DVec3::from_array);
         let eye = DVec3::from_array(camera.eye);
@@ -57,8 +57,8 @@ impl Keyframe {
     }
 }
 
-/// `count` cameras along a smooth path through `keyframes`, the first and the last included; all keyframes as they are
-/// without a count.
+/// `count` cameras along a smooth path through `keyframes`, the first and the last included. Without a count, the
+/// keyframes' own cameras.
 ///
 /// Eyes, targets and fields of view follow a Catmull-Rom spline.
 ///

@@ -1,4 +1,4 @@
-//! What can be wrong with a scene file, and where.
+//! Errors of scene files, and the places in the file where they occur.
 
 use std::fmt;
 use std::io;
@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
-/// Why a scene could not be read. Displayed as one sentence: file, place, reason.
+/// The reason that a scene could not be read. Displayed as one sentence: file, place, reason.
 #[derive(Debug, Error)]
 pub enum SceneError {
     /// The file cannot be opened or read.
@@ -14,10 +14,10 @@ pub enum SceneError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The system's error.
         source: io::Error,
     },
-    /// Neither the name nor the first bytes tell what the file is.
+    /// Neither the name nor the first bytes identify the format.
     #[error("{}: this is not a scene file of a known kind ({known})", path.display())]
     UnknownFormat {
         /// The file.
@@ -38,9 +38,9 @@ pub enum SceneError {
     Malformed {
         /// The file.
         path: PathBuf,
-        /// Where in the file.
+        /// The place in the file.
         place: Place,
-        /// What is wrong there.
+        /// The problem at that place.
         reason: Reason,
     },
 }
@@ -88,7 +88,7 @@ impl fmt::Display for Place {
     }
 }
 
-/// What is wrong at a [`Place`].
+/// The problem at a [`Place`].
 #[derive(Debug, Error)]
 pub enum Reason {
     /// The system failed to read.
@@ -97,7 +97,7 @@ pub enum Reason {
     /// The first bytes are not the format's.
     #[error("this is not {expected}")]
     Magic {
-        /// What the file should be.
+        /// The name of the expected format.
         expected: &'static str,
     },
     /// A version that is unknown or not read.
@@ -148,17 +148,17 @@ pub enum Reason {
     /// A count that disagrees with another one.
     #[error("it holds {found} entries, and {expected} are needed")]
     Count {
-        /// Entries there are.
+        /// The number of entries found.
         found: u64,
-        /// Entries there should be.
+        /// The number of entries expected.
         expected: u64,
     },
     /// The header claims more than the file can hold.
     #[error("{claimed} bytes are claimed, and {available} are there")]
     TooShort {
-        /// Bytes that the header's counts amount to (at least).
+        /// The least number of bytes that the header's counts require.
         claimed: u64,
-        /// Bytes that are there (at most).
+        /// The most bytes that the file can hold.
         available: u64,
     },
     /// The data ends early.
@@ -190,7 +190,7 @@ pub enum Reason {
     /// A JSON document is malformed, or not what the format demands.
     #[error("the JSON is malformed ({0})")]
     Json(String),
-    /// A name that leads out of the folder or the archive, or is none.
+    /// A name that is empty, or that leads out of the folder or the archive.
     #[error("this is not the name of a file beside the one that has it")]
     Name,
     /// A file that another one names cannot be read.
@@ -206,7 +206,7 @@ pub enum Reason {
         /// Entries that it should hold.
         expected: u64,
     },
-    /// What the file asks for is known, and not done; or is unknown. A whole clause.
+    /// A feature of the format that this reader does not support, or an unknown one. The text is a whole clause.
     #[error("{0}")]
     Unsupported(String),
     /// There is not enough memory.

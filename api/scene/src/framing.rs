@@ -1,4 +1,4 @@
-//! Cameras that suit a scene: one that has all of it in its picture, and one that stands inside.
+//! Cameras for a scene: one that has all of it in its picture, and one that stands inside.
 
 use glam::DVec3;
 
@@ -9,23 +9,23 @@ use crate::scene::Scene;
 /// Trained scenes have a haze of far-off Gaussians.
 const TAIL: f64 = 0.04;
 
-/// Gaussians that are looked at, at most.
+/// The most Gaussians that the box is computed from.
 const SAMPLE: usize = 1 << 18;
 
-/// The room around the box, relative to the picture.
+/// The size of the picture relative to the box.
 const MARGIN: f64 = 1.2;
 
-/// From the scene's centre to the eye: in front, somewhat to the side and above. Scenes have
-/// y down and z forward.
+/// The direction from the scene's centre to the eye: in front, somewhat to the side and above. Scenes have y down and z
+/// forward.
 const FROM: DVec3 = DVec3::new(0.35, -0.35, -1.0);
 
-/// The direction upwards in scenes whose files say nothing.
+/// The default direction upwards, for scenes whose files give none.
 pub const DEFAULT_UP: [f64; 3] = [0.0, -1.0, 0.0];
 
-/// The least half of the framed box's side, where nothing tells a size.
+/// Half of the least side of the framed box, for scenes without extent or sizes.
 const LEAST: f64 = 1e-3;
 
-/// A box around what is opaque of a scene, in the scene's units.
+/// A box around the opaque parts of a scene, in the scene's units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Extent {
     /// The middle.
@@ -40,7 +40,7 @@ impl Extent {
         let sample = sample(scene);
         let (min, max) = bounds(sample.iter().map(|s| (s.position, s.opacity)).collect());
         let half = (max - min) / 2.0;
-        // A point is framed, too: as large as what is drawn of it.
+        // A scene of one point gets a box as large as its Gaussian.
         let size = typical_size(&sample);
         let least = if size > 0.0 {
             (2.0 * size).min(1e30)
@@ -65,22 +65,22 @@ impl Extent {
         DEFAULT_NEAR.min(self.radius() / 5.0)
     }
 
-    /// How far the box reaches towards `direction`, a unit vector, from its middle.
+    /// The distance from the box's middle to its farthest point in `direction`, a unit vector.
     fn reach(&self, direction: DVec3) -> f64 {
         DVec3::from_array(self.half).dot(direction.abs())
     }
 }
 
-/// How a scene is looked at from outside. What is not given suits the scene.
+/// A view of a scene from outside. Values that are None are chosen for the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Framing {
-    /// Degrees around the scene, from the front (from where the camera looks along +z) to its right.
+    /// The angle in degrees around the scene, from the front (from where the camera looks along +z) to its right.
     pub azimuth: Option<f64>,
-    /// Degrees above the horizon, at most 90.
+    /// The angle in degrees above the horizon, at most 90.
     pub elevation: Option<f64>,
-    /// From the scene's middle, in its units.
+    /// The distance from the scene's middle, in its units.
     pub distance: Option<f64>,
-    /// How much larger than framed the picture is.
+    /// The magnification relative to the framed picture.
     pub zoom: f64,
     /// The direction upwards in the scene.
     pub up: [f64; 3],
@@ -91,7 +91,7 @@ pub struct Framing {
 }
 
 impl Framing {
-    /// A framing that leaves everything to the scene.
+    /// A framing with all values chosen for the scene.
     pub fn new(fov: f64, size: [u32; 2]) -> Self {
         Self {
             azimuth: None,
@@ -114,7 +114,7 @@ impl Framing {
         let eye = centre + from;
         let looking = Camera::look_at(eye.into(), centre.into(), up.into(), self.fov, self.size);
         let mut camera = match looking {
-            // The scene is so far out that the direction is lost in rounding.
+            // The scene is so far from the origin that rounding loses the direction.
             Err(CameraError::NoDirection | CameraError::NoUp) => Camera::new(
                 [[1., 0., 0.], [0., 1., 0.], [0., 0., 1.]],
                 eye.into(),
@@ -140,7 +140,7 @@ impl Framing {
             .fold(0.0, f64::max);
         let distance = self.distance.unwrap_or(framed);
         camera.eye = (centre - forward * distance).into();
-        // Half of the way to the box, where 3DGS's plane is not nearer anyway.
+        // The near plane is half of the way to the box, unless 3DGS's plane is nearer.
         let nearest = distance - extent.reach(forward);
         let near = if nearest > 0.0 {
             nearest / 2.0
@@ -152,7 +152,7 @@ impl Framing {
             .zoomed(self.zoom))
     }
 
-    /// From the middle to the eye, and what is upwards in the picture.
+    /// The direction from the middle to the eye, and the direction upwards in the picture.
     fn direction(&self) -> Result<(DVec3, DVec3), CameraError> {
         let given = self.azimuth.is_some() || self.elevation.is_some();
         if !given && self.up == DEFAULT_UP {
@@ -169,7 +169,7 @@ impl Framing {
         let side = up.cross(front);
         let level = azimuth.cos() * front + azimuth.sin() * side;
         let from = elevation.cos() * level + elevation.sin() * up;
-        // Straight from above or below, the picture's upper edge is the far or the near one.
+        // Seen straight from above or below, the picture's upper edge is the far or the near one.
         let upwards = if elevation.cos().abs() < 1e-6 {
             -level * elevation.sin().signum()
         } else {
@@ -179,7 +179,7 @@ impl Framing {
     }
 }
 
-/// The azimuth and the elevation of a framing that doesn't give them, in degrees.
+/// The default azimuth and elevation of a framing, in degrees.
 pub fn default_angles() -> (f64, f64) {
     let level = FROM.x.hypot(FROM.z);
     (
@@ -188,7 +188,7 @@ pub fn default_angles() -> (f64, f64) {
     )
 }
 
-/// The direction of azimuth 0: towards -z, or as near to it as is level.
+/// The direction of azimuth 0: the horizontal direction nearest to -z; or to +y, if -z is almost vertical.
 fn front(up: DVec3) -> DVec3 {
     let level = |direction: DVec3| direction - direction.dot(up) * up;
     let towards = level(DVec3::NEG_Z);
@@ -199,9 +199,8 @@ fn front(up: DVec3) -> DVec3 {
     }
 }
 
-/// A camera that looks forward at `scene` from a little above, with what is opaque of it in
-/// a picture of `size` pixels and a vertical field of view of `fov` degrees (more than 0, less
-/// than 180).
+/// A camera that looks forward at `scene` from a little above, with its opaque parts in a picture of `size` pixels and
+/// a vertical field of view of `fov` degrees (more than 0, less than 180).
 pub fn frame(scene: &Scene, fov: f64, size: [u32; 2]) -> Camera {
     let extent = Extent::of(scene);
     Framing::new(fov, size).camera(&extent).unwrap_or_else(|_| {
@@ -214,7 +213,8 @@ pub fn frame(scene: &Scene, fov: f64, size: [u32; 2]) -> Camera {
     })
 }
 
-/// A camera in the middle of the scene that looks along `azimuth` degrees (0 looks along +z, as from the front), level.
+/// A camera in the middle of the scene that looks horizontally along `azimuth` degrees (0 looks along +z, as from the
+/// front).
 ///
 /// # Errors
 /// [`CameraError::NoUp`] if `up` is zero, and others for numbers that are not finite.
@@ -236,7 +236,7 @@ pub fn inside(
     Ok(camera.with_planes(extent.near() / 4.0, f64::INFINITY))
 }
 
-/// What is looked at of a Gaussian.
+/// The data of a Gaussian that framing uses.
 struct Sample {
     position: DVec3,
     opacity: f64,
@@ -344,7 +344,7 @@ mod tests {
             }
             assert!(extent.iter().all(|e| *e <= 1.1), "{extent:?}");
             assert!(extent.iter().any(|e| *e > 0.6), "{extent:?}");
-            // Seen from above: y points down.
+            // The eye is above: y points down.
             assert!(camera.eye[1] < 20.0 && camera.eye[2] < 30.0);
             assert_eq!(camera.near, DEFAULT_NEAR);
         }
@@ -424,7 +424,7 @@ mod tests {
         near(at(-180.0, 0.0, DEFAULT_UP), [0.0, 0.0, 10.0]);
         near(at(45.0, 90.0, DEFAULT_UP), [0.0, -10.0, 0.0]);
         near(at(0.0, -90.0, DEFAULT_UP), [0.0, 10.0, 0.0]);
-        // With z upwards, the front is where y is great.
+        // With z upwards, the front is at the greatest y.
         near(at(0.0, 0.0, [0.0, 0.0, 1.0]), [0.0, 10.0, 0.0]);
         near(at(0.0, 90.0, [0.0, 0.0, 2.0]), [0.0, 0.0, 10.0]);
         let (azimuth, elevation) = default_angles();

@@ -1,4 +1,4 @@
-//! Spherical harmonics of turned Gaussians.
+//! Rotations of spherical harmonics.
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
 
@@ -18,20 +18,20 @@ pub(crate) fn sh_coefficients(degree: u32) -> usize {
 /// The number of basis functions up to [`MAX_SH_DEGREE`].
 const BASIS: usize = (MAX_SH_DEGREE as usize + 1).pow(2);
 
-/// What an orthogonal map does to coefficients: those of the new scene have the colours in the mapped directions that
-/// the old ones have in the directions themselves.
+/// The effect of an orthogonal map on spherical harmonics coefficients. The new coefficients have in a mapped direction
+/// the colour that the old ones have in the direction itself.
 #[derive(Debug)]
 pub(crate) enum Turn {
-    /// Nothing.
+    /// No change.
     Identity,
     /// A sign for each coefficient.
     Signs([f32; BASIS]),
-    /// A square matrix for each degree from 1 on, of rows after each other.
+    /// A square matrix for each degree from 1 on, stored row by row.
     Matrices(Vec<Vec<f64>>),
 }
 
 impl Turn {
-    /// The turn by `map`, an orthogonal matrix that may mirror, for coefficients up to `degree`.
+    /// The effect of `map`, an orthogonal matrix that may include a reflection, on coefficients up to `degree`.
     pub(crate) fn new(map: &DMat3, degree: u32) -> Self {
         if degree == 0 || *map == DMat3::IDENTITY {
             return Self::Identity;
@@ -54,7 +54,7 @@ impl Turn {
         Self::Signs(signs)
     }
 
-    /// Turns one Gaussian's coefficients, the constant one first.
+    /// Transforms one Gaussian's coefficients, of which the constant one is first.
     pub(crate) fn apply(&self, sh: &mut [[f32; 3]]) {
         match self {
             Self::Identity => {}
@@ -74,7 +74,7 @@ impl Turn {
                     for (rgb, row) in band.iter_mut().zip(matrix.chunks_exact(size)) {
                         let mut sum = [0.0; 3];
                         for (factor, old) in row.iter().zip(&old) {
-                            // A zero takes nothing, of an infinity neither.
+                            // A factor of zero is skipped, because zero times infinity is NaN.
                             if *factor != 0.0 {
                                 for (sum, old) in sum.iter_mut().zip(old) {
                                     *sum += factor * f64::from(*old);
@@ -89,7 +89,7 @@ impl Turn {
     }
 }
 
-/// The matrix that turns the coefficients of `degree`: entry (m, n) is the integral over the sphere of basis function m
+/// The matrix that maps the coefficients of `degree`: entry (m, n) is the integral over the sphere of basis function m
 /// in the mapped direction times function n.
 fn matrix(map: &DMat3, degree: usize) -> Vec<f64> {
     let band = degree * degree..(degree + 1) * (degree + 1);
@@ -103,7 +103,7 @@ fn matrix(map: &DMat3, degree: usize) -> Vec<f64> {
             }
         }
     }
-    // What is exact for turns onto the axes stays exact.
+    // Entries that are -1, 0 or 1 up to rounding become exact, as they are for rotations of the axes onto each other.
     for entry in &mut matrix {
         for exact in [-1.0, 0.0, 1.0] {
             if (*entry - exact).abs() < 1e-12 {
@@ -114,8 +114,8 @@ fn matrix(map: &DMat3, degree: usize) -> Vec<f64> {
     matrix
 }
 
-/// Directions and weights that integrate polynomials of degree 9 and less over the sphere exactly: Gauss-Legendre's of
-/// five heights, ten directions each.
+/// Directions and weights that integrate polynomials of degree 9 and less over the sphere exactly: the Gauss-Legendre
+/// quadrature of five heights, with ten directions each.
 fn quadrature() -> impl Iterator<Item = (DVec3, f64)> {
     let heights = [
         (0.0, 128.0 / 225.0),
@@ -138,7 +138,8 @@ fn quadrature() -> impl Iterator<Item = (DVec3, f64)> {
 pub(crate) fn basis(d: DVec3) -> [f64; BASIS] {
     const DEGREE: usize = MAX_SH_DEGREE as usize;
     let mut values = [0.0; BASIS];
-    // Of (x + iy)^m and of the associated Legendre functions without their power of sin(theta).
+    // The real and imaginary parts of (x + iy)^m; below, the associated Legendre functions without their power of
+    // sin(theta).
     let (mut real, mut imaginary) = (1.0, 0.0);
     let mut sectoral = 1.0;
     for m in 0..=DEGREE {
@@ -171,7 +172,7 @@ mod tests {
     fn the_basis_is_that_of_3dgs() {
         let d = DVec3::new(0.36, -0.48, 0.8);
         let [x, y, z] = d.to_array();
-        // The constants of the original code.
+        // The constants of the original 3DGS code.
         let expected = [
             SH_C0,
             -0.488_602_511_902_919_9 * y,
@@ -246,7 +247,7 @@ mod tests {
                 }
             }
         }
-        // Turns onto the axes take no digit.
+        // Rotations of the axes onto each other are exact.
         assert!(matches!(Turn::new(&half_turn, 4), Turn::Signs(_)));
         assert!(matches!(Turn::new(&mirror, 4), Turn::Signs(_)));
     }

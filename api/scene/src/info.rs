@@ -1,4 +1,4 @@
-//! What a scene holds, in numbers.
+//! Statistics of a scene.
 
 use serde::Serialize;
 
@@ -6,30 +6,32 @@ use crate::metadata::Metadata;
 use crate::scene::Scene;
 use crate::shape::GaussianShape;
 
-/// Bars of [`Info::opacities`].
+/// The number of bars of [`Info::opacities`].
 const OPACITY_BARS: usize = 10;
 
-/// The powers of ten that [`Info::scales`] begins and ends with.
+/// The powers of ten at which [`Info::scales`] begins and ends.
 const SCALE_DECADES: [i32; 2] = [-7, 4];
 
-/// What a scene holds, in numbers; as JSON by `serde`.
+/// Statistics of a scene; `serde` writes them as JSON.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Info {
-    /// Gaussians.
+    /// The number of Gaussians.
     pub gaussians: usize,
     /// The spherical harmonics degree.
     pub sh_degree: u32,
-    /// Bytes in memory.
+    /// Its size in memory, in bytes.
     pub bytes: u64,
-    /// Gaussians of which a number is not finite; the device skips those whose shape or place is not.
+    /// The number of Gaussians with a number that is not finite. The device skips those whose shape or position is not
+    /// finite.
     pub non_finite: usize,
-    /// The least and the greatest coordinates of finite centres; none if there is no such.
+    /// The least and the greatest coordinates of finite centres; None if there is none.
     pub bounds: Option<Bounds>,
-    /// The finite Gaussians by opacity, in ten steps from 0 to 1.
+    /// A histogram of the finite Gaussians' opacities, in ten steps from 0 to 1.
     pub opacities: Vec<Bar>,
-    /// The finite Gaussians by their largest standard deviation, a decade a bar. The outermost bars have the rest, too.
+    /// A histogram of the finite Gaussians' largest standard deviations, a decade a bar. The outermost bars include the
+    /// rest.
     pub scales: Vec<Bar>,
-    /// What the file says of itself.
+    /// The file's metadata.
     pub metadata: Metadata,
 }
 
@@ -45,14 +47,14 @@ pub struct Bounds {
 /// A bar of a histogram.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Bar {
-    /// The least value that belongs to it.
+    /// The least value in the bar.
     pub from: f32,
-    /// Gaussians.
+    /// The number of Gaussians in the bar.
     pub count: usize,
 }
 
 impl Info {
-    /// The numbers of `scene`.
+    /// The statistics of `scene`.
     pub fn new(scene: &Scene) -> Self {
         let bar = |from: f32| Bar { from, count: 0 };
         let [first, last] = SCALE_DECADES;

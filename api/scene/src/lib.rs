@@ -1,8 +1,7 @@
 //! Scenes of 3D Gaussians and cameras: reading them from files, framing a scene, and a generated garden.
 //!
-//! Every [`Scene`] is in the frame of the original 3D Gaussian splatting code and its PLY files:
-//! +x right, +y **down**, +z forward. Files of other frames are turned when they are read; `docs/files.md` has the
-//! formats and their frames.
+//! Every [`Scene`] is in the frame of the original 3D Gaussian splatting code and its PLY files: +x right, +y **down**,
+//! +z forward. Files in other frames are rotated when they are read; `docs/files.md` has the formats and their frames.
 
 pub mod camera;
 pub mod camera_files;

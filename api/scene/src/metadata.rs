@@ -1,69 +1,69 @@
-//! What a scene file says of itself, apart from its Gaussians.
+//! The metadata of a scene file: what it states apart from its Gaussians.
 
 use serde::Serialize;
 
-/// How the filter of 0.3 px^2 is paid for that every Gaussian gets on the screen.
+/// The compensation for the filter of 0.3 px^2 that every Gaussian gets on the screen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Antialiasing {
-    /// Not at all: Gaussians get larger, as 3DGS has it.
+    /// None: the filter makes Gaussians larger, as in 3DGS.
     #[default]
     Off,
-    /// By opacity: what Mip-Splatting, gsplat's `antialiased` and Brush's `mip` are trained with.
+    /// Reduced opacity, with which Mip-Splatting, gsplat's `antialiased` and Brush's `mip` train.
     Compensated,
 }
 
-/// What Gaussians are in space.
+/// The shape of Gaussians in space.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Geometry {
-    /// Volumes with three axes, as of 3DGS.
+    /// Volumes with three axes, as in 3DGS.
     #[default]
     Volume,
-    /// Flat discs with two, as of 2DGS; the third scale is 0.
+    /// Flat discs with two axes, as in 2DGS; the third scale is 0.
     Surfel,
 }
 
-/// What Gaussians are sorted by.
+/// The key by which Gaussians are sorted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum SortOrder {
-    /// Their centres' depth along the view direction, as 3DGS does.
+    /// The depth of their centres along the view direction, as in 3DGS.
     #[default]
     Depth,
-    /// Their centres' distance from the camera: `cameraDistance` of glTF.
+    /// The distance of their centres from the camera: `cameraDistance` of glTF.
     Distance,
 }
 
-/// The colour space that a scene's colours are in, and are blended in.
+/// The colour space of a scene's colours, in which they are blended.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub enum ColorSpace {
-    /// BT.709's primaries with sRGB's transfer function, as pictures are shown: what 3DGS is trained on.
+    /// BT.709 primaries with the sRGB transfer function, as on displays: the colours of 3DGS's training.
     #[default]
     #[serde(rename = "srgb_rec709_display")]
     SrgbRec709Display,
-    /// BT.709's primaries, linear.
+    /// BT.709 primaries, linear.
     #[serde(rename = "lin_rec709_display")]
     LinearRec709Display,
 }
 
-/// What a scene file says of itself. Nothing is `None` or empty by default: the file says nothing.
+/// The metadata of a scene file. A field is None or empty if the file does not state it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Metadata {
-    /// How its Gaussians were filtered when they were trained.
+    /// The compensation for the screen filter in training.
     pub antialiasing: Option<Antialiasing>,
-    /// What its Gaussians are.
+    /// The shape of its Gaussians.
     pub geometry: Option<Geometry>,
-    /// What its colours are.
+    /// The space of its colours.
     pub color_space: Option<ColorSpace>,
-    /// What its Gaussians are to be sorted by.
+    /// The key by which its Gaussians are to be sorted.
     pub order: Option<SortOrder>,
-    /// What the reader passed over or had to assume, a sentence each without a full stop.
+    /// Parts of the file that the reader ignored, and its assumptions: a sentence each, without a full stop.
     pub notes: Vec<String>,
 }
 
 impl Metadata {
-    /// Keeps what `other` says too, and adds its notes.
+    /// Merges the metadata of another file, and adds its notes.
     pub(crate) fn join(&mut self, other: Self) {
         fn agree<T: PartialEq>(field: &mut Option<T>, other: Option<T>) -> bool {
             let agreed = *field == other;
@@ -89,7 +89,7 @@ impl Metadata {
         }
     }
 
-    /// Adds a note, once.
+    /// Adds a note, unless it is there already.
     pub(crate) fn note(&mut self, note: impl Into<String>) {
         let note = note.into();
         if !self.notes.contains(&note) {

@@ -1,11 +1,11 @@
-//! Random numbers that generated scenes are made of.
+//! Random numbers for generated scenes.
 
 use std::f64::consts::TAU;
 
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-/// A normally distributed number (Box and Muller's method).
+/// A normally distributed number (Box-Muller method).
 pub fn normal(rng: &mut ChaCha8Rng) -> f64 {
     let radius = (-2.0 * (1.0 - rng.random::<f64>()).ln()).sqrt();
     radius * (TAU * rng.random::<f64>()).cos()

@@ -8,12 +8,12 @@ use crate::metadata::{Antialiasing, Geometry, Metadata};
 use crate::shape::GaussianShape;
 use crate::transform::{Motion, Transform};
 
-/// Gaussians that a thread works on at least.
+/// The least number of Gaussians for a thread.
 const PARALLEL: usize = 1 << 12;
 
 /// A set of 3D Gaussians, held as parallel arrays ready for upload.
 ///
-/// Values may be non-finite where a file says so: the device skips and counts such Gaussians.
+/// Values may be non-finite if the file has such values: the device skips and counts these Gaussians.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scene {
     positions: Vec<[f32; 3]>,
@@ -24,10 +24,9 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// An empty scene of spherical harmonics degree `sh_degree`, with room for `count` Gaussians.
+    /// An empty scene of spherical harmonics degree `sh_degree`, with memory reserved for `count` Gaussians.
     ///
-    /// # Panics
-    /// If `sh_degree` exceeds [`MAX_SH_DEGREE`].
+    /// # Panics Panics if `sh_degree` exceeds [`MAX_SH_DEGREE`].
     pub fn with_capacity(sh_degree: u32, count: usize) -> Self {
         assert!(
             sh_degree <= MAX_SH_DEGREE,
@@ -76,8 +75,8 @@ impl Scene {
         Ok(scene)
     }
 
-    /// Appends `count` Gaussians made in parallel: `each` is given the index among them of one, and its coefficients to
-    /// fill, zeros so far, and returns its position and shape.
+    /// Appends `count` Gaussians made in parallel. `each` gets the index of a Gaussian among them, and its
+    /// coefficients, which are zero and which it fills. It returns the Gaussian's position and shape.
     pub(crate) fn extend(
         &mut self,
         count: usize,
@@ -93,7 +92,7 @@ impl Scene {
         let make = |(index, ((position, shape), sh)): (usize, ((&mut _, &mut _), &mut [_]))| {
             (*position, *shape) = each(index, sh);
         };
-        // A row of a text file is not worth waking another thread.
+        // Few Gaussians, such as a row of a text file, are not worth another thread.
         if count < PARALLEL {
             let gaussians = positions.iter_mut().zip(shapes);
             let gaussians = gaussians.zip(sh.chunks_exact_mut(stride));
@@ -108,7 +107,7 @@ impl Scene {
             .for_each(make);
     }
 
-    /// Moves every Gaussian.
+    /// Transforms every Gaussian.
     pub(crate) fn apply(&mut self, motion: &Motion) {
         let stride = self.sh_stride();
         self.positions
@@ -119,15 +118,15 @@ impl Scene {
             .for_each(|((position, shape), sh)| motion.apply(position, shape, sh));
     }
 
-    /// Appends the Gaussians of `other`, moved by `transform`, and what it says of itself where both agree; where they
-    /// don't, a note says so. The spherical harmonics degree becomes the greater one.
+    /// Appends the Gaussians of `other`, transformed by `transform`. Metadata on which the two disagree are dropped,
+    /// and a note says so. The spherical harmonics degree becomes the greater one.
     pub fn append(&mut self, other: &Self, transform: &Transform) {
         let mut moved = other.clone();
         moved.apply(&transform.motion(other.sh_degree));
         self.join(moved);
     }
 
-    /// As [`Scene::join`], for scenes that a file may name many times.
+    /// Appends like [`Scene::join`], but reports a lack of memory: a file may name a scene many times.
     ///
     /// # Errors
     /// If there is not enough memory.
@@ -147,7 +146,7 @@ impl Scene {
         Ok(())
     }
 
-    /// Appends `other` as it is.
+    /// Appends `other` without a transform.
     fn join(&mut self, mut other: Self) {
         if self.is_empty() {
             *self = other;
@@ -162,7 +161,7 @@ impl Scene {
         self.metadata.join(other.metadata);
     }
 
-    /// The Gaussians `range`, with all that the scene says of itself.
+    /// The Gaussians `range`, with the scene's metadata.
     pub(crate) fn range(&self, range: std::ops::Range<usize>) -> Self {
         let stride = self.sh_stride();
         Self {
@@ -174,7 +173,7 @@ impl Scene {
         }
     }
 
-    /// Makes the degree `degree`, with coefficients of zero.
+    /// Raises the degree to `degree`; new coefficients are zero.
     fn raise_degree(&mut self, degree: u32) {
         if degree == self.sh_degree {
             return;
@@ -188,22 +187,22 @@ impl Scene {
         (self.sh, self.sh_degree) = (sh, degree);
     }
 
-    /// What the scene's file says of itself.
+    /// The metadata of the scene's file.
     pub fn metadata(&self) -> &Metadata {
         &self.metadata
     }
 
-    /// The same, for changes.
+    /// The metadata, for changes.
     pub fn metadata_mut(&mut self) -> &mut Metadata {
         &mut self.metadata
     }
 
-    /// How the scene wants Gaussians to be filtered: what its file says, or as 3DGS does.
+    /// The compensation for the screen filter: the file's, or none as in 3DGS.
     pub fn antialiasing(&self) -> Antialiasing {
         self.metadata.antialiasing.unwrap_or_default()
     }
 
-    /// What the scene's Gaussians are: what its file says, or volumes.
+    /// The shape of the scene's Gaussians: the file's, or volumes.
     pub fn geometry(&self) -> Geometry {
         self.metadata.geometry.unwrap_or_default()
     }
@@ -225,7 +224,7 @@ impl Scene {
         self.positions.len()
     }
 
-    /// Whether there is no Gaussian.
+    /// True if there is no Gaussian.
     pub fn is_empty(&self) -> bool {
         self.positions.is_empty()
     }
@@ -250,13 +249,13 @@ impl Scene {
         sh_coefficients(self.sh_degree)
     }
 
-    /// The coefficients of all Gaussians, [`Scene::sh_stride`] RGB triples each, in 3DGS's order
-    /// and signs; a colour is 0.5 plus their sum weighted by the basis functions.
+    /// The coefficients of all Gaussians, [`Scene::sh_stride`] RGB triples each, in 3DGS's order and signs. A colour is
+    /// 0.5 plus their sum weighted by the basis functions.
     pub fn sh(&self) -> &[[f32; 3]] {
         &self.sh
     }
 
-    /// The coefficients of Gaussian `index`, for a reader that meets them after the rest.
+    /// The coefficients of Gaussian `index`, for a reader that reads them after the rest.
     pub(crate) fn sh_of_mut(&mut self, index: usize) -> &mut [[f32; 3]] {
         let stride = self.sh_stride();
         &mut self.sh[index * stride..][..stride]

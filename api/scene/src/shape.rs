@@ -1,16 +1,15 @@
-//! One Gaussian, apart from its position and its colour.
+//! A Gaussian's scale, rotation and opacity.
 
 use bytemuck::{Pod, Zeroable};
 
-/// What one Gaussian is, apart from its position and its colour: 32 bytes, as a vertex buffer
-/// holds it.
+/// A Gaussian's scale, rotation and opacity: 32 bytes, in the layout of a vertex buffer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct GaussianShape {
     /// Standard deviations along the Gaussian's own axes, in the scene's units (not logarithms).
     pub scale: [f32; 3],
-    /// Rotation from the Gaussian's own axes to the scene's: a quaternion w, x, y, z as the file
-    /// stores it. It need not be normalised; the device does that.
+    /// Rotation from the Gaussian's own axes to the scene's: a quaternion w, x, y, z as the file stores it. It need not
+    /// be normalised; the device normalises it.
     pub rotation: [f32; 4],
     /// Opacity at the centre, 0 to 1 (not a logit).
     pub opacity: f32,

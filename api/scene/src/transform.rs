@@ -1,23 +1,23 @@
-//! Moving Gaussians: a scene scaled, turned and moved, with its colours turned along.
+//! Transforms of Gaussians: scaled, rotated and moved, with their view-dependent colours rotated.
 
 use glam::{DMat3, DQuat, DVec3};
 
 use crate::harmonics::Turn;
 use crate::shape::GaussianShape;
 
-/// Where a scene is put in another: scaled, then turned, then moved.
+/// The placement of a scene in another: it is scaled, then rotated, then moved.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Transform {
     /// A positive factor.
     pub scale: f64,
     /// A rotation; it need not be normalised.
     pub rotation: DQuat,
-    /// Added last, in the units of the scene that it is put in.
+    /// The translation, in units of the scene in which it is placed.
     pub translation: DVec3,
 }
 
 impl Default for Transform {
-    /// The transform that changes nothing.
+    /// The identity.
     fn default() -> Self {
         Self {
             scale: 1.0,
@@ -28,14 +28,14 @@ impl Default for Transform {
 }
 
 impl Transform {
-    /// The same, ready for many Gaussians of at most spherical harmonics degree `degree`.
+    /// The transform prepared for many Gaussians of at most spherical harmonics degree `degree`.
     pub(crate) fn motion(&self, degree: u32) -> Motion {
         let rotation = DMat3::from_quat(self.rotation.normalize());
         Motion::new(self.scale * rotation, self.translation, degree)
     }
 }
 
-/// An affine map, ready for many Gaussians.
+/// An affine map prepared for many Gaussians.
 #[derive(Debug)]
 pub(crate) struct Motion {
     linear: DMat3,
@@ -44,21 +44,21 @@ pub(crate) struct Motion {
     turn: Turn,
 }
 
-/// What a map does to scales and rotations.
+/// The effect of a map on scales and rotations.
 #[derive(Debug)]
 enum ShapeMotion {
-    /// Axes are kept or negated: signs of a quaternion's vector part.
+    /// Axes are kept or negated. The vector has the signs for a quaternion's vector part.
     Flip(DVec3),
-    /// All lengths get one factor. A Gaussian is its own mirror image, so a mirrored map has the rotation of its
-    /// negative.
+    /// All lengths are multiplied by one factor. A Gaussian is its own mirror image, so a map with a reflection uses
+    /// the rotation of its negative.
     Similarity { rotation: DQuat, scale: f32 },
-    /// Lengths change by direction.
+    /// Lengths change by different factors in different directions.
     General,
 }
 
 impl Motion {
     /// The map x -> `linear` x + `translation`, for Gaussians of at most spherical harmonics degree `degree`. Colours
-    /// are turned by the orthogonal factor of `linear`'s polar decomposition.
+    /// are rotated by the orthogonal factor of `linear`'s polar decomposition.
     pub(crate) fn new(linear: DMat3, translation: DVec3, degree: u32) -> Self {
         let diagonal = DVec3::new(linear.x_axis.x, linear.y_axis.y, linear.z_axis.z);
         let (shape, orthogonal) =
@@ -81,7 +81,7 @@ impl Motion {
         }
     }
 
-    /// Moves a Gaussian: its centre, its shape and its coefficients, the constant one first.
+    /// Transforms a Gaussian: its centre, its shape and its coefficients, of which the constant one is first.
     pub(crate) fn apply(
         &self,
         position: &mut [f32; 3],
@@ -107,7 +107,7 @@ impl Motion {
         self.turn.apply(sh);
     }
 
-    /// Finds scales and rotation of the map's image of an ellipsoid. One that is not finite is kept.
+    /// Computes scales and rotation of the map's image of an ellipsoid. A shape that is not finite is kept.
     fn reshape(&self, shape: &mut GaussianShape) {
         let [w, x, y, z] = shape.rotation.map(f64::from);
         let rotation = DQuat::from_xyzw(x, y, z, w);
@@ -125,7 +125,7 @@ impl Motion {
     }
 }
 
-/// The factor and the orthogonal matrix that `linear` is the product of, if there are any.
+/// The factor and the orthogonal matrix whose product is `linear`. None if it is no such product.
 fn similarity(linear: DMat3) -> Option<(f64, DMat3)> {
     let scale = linear.determinant().abs().cbrt();
     let orthogonal = linear * scale.recip();
@@ -141,11 +141,11 @@ fn similarity(linear: DMat3) -> Option<(f64, DMat3)> {
 fn orthogonal_factor(linear: DMat3) -> DMat3 {
     let (image, turned) = orthogonal_columns(linear);
     let frame = frame(image) * turned.transpose();
-    // `frame` is proper; a mirrored map's factor is not.
+    // `frame` is a proper rotation; the factor of a map with a reflection is not.
     frame * (frame.determinant() * linear.determinant()).signum()
 }
 
-/// An orthonormal, proper basis along the orthogonal columns of `matrix`, of which some may be zero.
+/// An orthonormal basis of positive determinant along the orthogonal columns of `matrix`, some of which may be zero.
 fn frame(matrix: DMat3) -> DMat3 {
     let axes = [matrix.x_axis, matrix.y_axis, matrix.z_axis];
     let longest = (0..3).fold(0, |best, i| {
@@ -168,11 +168,11 @@ fn frame(matrix: DMat3) -> DMat3 {
     DMat3::from_cols(basis[0], basis[1], basis[2])
 }
 
-/// `matrix` times a rotation that makes its columns orthogonal, and that rotation: the one-sided Jacobi method.
+/// `matrix` times a rotation that makes its columns orthogonal, and that rotation (one-sided Jacobi method).
 fn orthogonal_columns(matrix: DMat3) -> (DMat3, DMat3) {
     let mut columns = [matrix.x_axis, matrix.y_axis, matrix.z_axis];
     let mut turned = [DVec3::X, DVec3::Y, DVec3::Z];
-    // It converges quadratically; a fifth sweep changes nothing any more.
+    // Convergence is quadratic; a fifth sweep no longer changes anything.
     for _ in 0..12 {
         for (p, q) in [(0, 1), (0, 2), (1, 2)] {
             let (a, b) = (columns[p].length_squared(), columns[q].length_squared());

@@ -10,7 +10,7 @@ use super::view::{
 };
 use crate::camera::Model;
 
-/// COLMAP's camera models, by number: the name, and how many parameters it has.
+/// COLMAP's camera models, by number: the name, and the number of parameters.
 const MODELS: [(&str, usize); 11] = [
     ("SIMPLE_PINHOLE", 3),
     ("PINHOLE", 4),
@@ -25,10 +25,10 @@ const MODELS: [(&str, usize); 11] = [
     ("THIN_PRISM_FISHEYE", 12),
 ];
 
-/// Bytes of a point of an image: its place and the number of the point in space.
+/// Bytes of a point of an image: its position and the number of the point in space.
 const POINT: usize = 24;
 
-/// The folder of the sparse model that `path` is, or is a file of.
+/// The folder of the sparse model that `path` is, or that contains the file `path`.
 pub(super) fn folder(path: &Path) -> Option<PathBuf> {
     let holds = |folder: &Path| {
         ["bin", "txt"].iter().any(|kind| {
@@ -55,7 +55,7 @@ fn parent(path: &Path) -> PathBuf {
     }
 }
 
-/// A camera's model, picture and numbers.
+/// A camera's model, picture size and parameters.
 struct Intrinsics {
     model: String,
     size: [f64; 2],
@@ -65,13 +65,13 @@ struct Intrinsics {
 /// A photograph's pose: world to camera.
 struct Photograph {
     name: String,
-    /// w, x, y, z.
+    /// The rotation's quaternion w, x, y, z.
     rotation: [f64; 4],
     translation: [f64; 3],
     camera: u64,
 }
 
-/// Reads the model in `folder`; views are in the order of their names.
+/// Reads the model in `folder`. Views are in the order of their names.
 pub(super) fn read(
     folder: &Path,
     options: &CameraFileOptions,
@@ -181,7 +181,7 @@ impl Photograph {
     }
 }
 
-/// Bytes that are taken from the front.
+/// Bytes that are read from the front.
 struct Bytes<'a>(&'a [u8]);
 
 impl<'a> Bytes<'a> {
@@ -315,7 +315,7 @@ fn text_cameras(bytes: &[u8]) -> Result<HashMap<u64, Intrinsics>, &'static str> 
     Ok(cameras)
 }
 
-/// Each image has two lines, of which the second, its points, may be empty.
+/// Parses a text file of images. Each image has two lines, of which the second, its points, may be empty.
 fn text_images(bytes: &[u8]) -> Result<Vec<Photograph>, &'static str> {
     let mut images = Vec::new();
     let mut lines = lines(bytes)?;
@@ -349,7 +349,7 @@ mod tests {
 
     const CAMERAS: &str =
         "# cameras\n1 PINHOLE 200 100 50 80 90 60\n2 OPENCV 64 48 50 50 32 24 0.1 0 0 0\n";
-    /// b looks along +z from (1, 2, 3); a the same, half turned about y.
+    /// b looks along +z from (1, 2, 3); a is the same, rotated half a turn about y.
     const IMAGES: &str =
         "# images\n7 1 0 0 0 -1 -2 -3 1 b.png\n\n9 0 0 1 0 1 -2 3 1 a.png\n1 2 -1\n";
 

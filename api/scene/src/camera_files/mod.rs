@@ -15,11 +15,9 @@ use nerfstudio::{CameraPath, Dataparser, Transforms};
 use view::Numbers;
 pub use view::{CameraFile, CameraFileError, CameraFileOptions, View, ViewError};
 
-/// Reads all cameras of the file at `path`. `size` stands in for an image size that a
-/// transforms.json doesn't give.
+/// Reads all cameras of the file at `path`. `size` replaces an image size that a transforms.json doesn't give.
 ///
-/// # Errors
-/// If the file cannot be read, is of no known kind, or holds a camera that is none.
+/// # Errors Returns an error if the file can't be read, is of no known kind, or has an invalid camera.
 pub fn load(path: &Path, size: [u32; 2]) -> Result<Vec<View>, CameraFileError> {
     let options = CameraFileOptions {
         size,
@@ -31,8 +29,7 @@ pub fn load(path: &Path, size: [u32; 2]) -> Result<Vec<View>, CameraFileError> {
 
 /// Reads all cameras of the file, or of COLMAP's folder, at `path`.
 ///
-/// # Errors
-/// If the file cannot be read, is of no known kind, or holds a camera that is none.
+/// # Errors Returns an error if the file can't be read, is of no known kind, or has an invalid camera.
 pub fn read(path: &Path, options: &CameraFileOptions) -> Result<CameraFile, CameraFileError> {
     if let Some(folder) = colmap::folder(path) {
         let mut file = colmap::read(&folder, options)?;
@@ -115,8 +112,7 @@ fn parse(
     Ok(CameraFile { views, ignored })
 }
 
-/// One entry of cameras.json. The rotation is camera to world: its columns are the directions
-/// right, down and forward.
+/// An entry of cameras.json. The rotation is camera to world: its columns are the directions right, down and forward.
 #[derive(Deserialize)]
 struct InriaCamera {
     #[serde(default)]
@@ -186,7 +182,7 @@ mod tests {
         );
     }
 
-    /// Looks along +x of the world: right is -z, down is +y.
+    /// A camera that looks along +x of the world: right is -z, down is +y.
     const INRIA: &str = r#"[{"id": 0, "img_name": "a", "width": 200, "height": 100,
         "position": [1, 2, 3], "rotation": [[0, 0, 1], [0, 1, 0], [-1, 0, 0]],
         "fy": 80, "fx": 50}]"#;
@@ -281,7 +277,7 @@ mod tests {
         let camera = &file.views[0].camera;
         assert_eq!(camera.eye, [0.0, -1.0, 1.5]);
         assert_eq!(camera.rotation[0], [-1.0, 0.0, 0.0]);
-        // What was applied to the frames already is part of the transform.
+        // A transform that was already applied to the frames is part of the file's transform.
         let applied = FISHEYE.replace(
             "\"w\"",
             "\"applied_transform\": [[0, 1, 0, 0], [1, 0, 0, 0], [0, 0, -1, 0]], \"applied_scale\": 0.25, \"w\"",

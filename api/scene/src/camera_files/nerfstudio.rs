@@ -6,20 +6,20 @@ use serde::Deserialize;
 use super::view::{CameraFileOptions, Distortion, Numbers, View, ViewError};
 use crate::camera::Model;
 
-/// A transforms.json, or anything with braces around it.
+/// A transforms.json, or any other JSON object.
 #[derive(Deserialize)]
 pub(super) struct Transforms {
     #[serde(flatten)]
     intrinsics: Intrinsics,
     frames: Option<Vec<Frame>>,
     camera_path: Option<serde_json::Value>,
-    /// What was done to the poses of the frames before they were written.
+    /// The transform that was applied to the frames' poses before they were written.
     applied_transform: Option<[[f64; 4]; 3]>,
     applied_scale: Option<f64>,
 }
 
 impl Transforms {
-    /// Tells if the file is the viewer's camera path instead.
+    /// Reports whether the file is the viewer's camera path instead.
     pub(super) fn is_camera_path(&self) -> bool {
         self.frames.is_none() && self.camera_path.is_some()
     }
@@ -45,14 +45,14 @@ impl Transforms {
     }
 }
 
-/// A dataparser_transforms.json: from where the photographs were to where the trained model is.
+/// A dataparser_transforms.json: the map from the photographs' world to that of the trained model.
 #[derive(Deserialize)]
 pub(super) struct Dataparser {
     transform: [[f64; 4]; 3],
     scale: f64,
 }
 
-/// What takes the frames of a transforms.json to where the model is: the scale comes last.
+/// The map from the frames of a transforms.json to the model's world: the transform, then the scale.
 struct Placement {
     transform: DMat4,
     scale: f64,
@@ -62,7 +62,7 @@ fn matrix([x, y, z]: [[f64; 4]; 3]) -> DMat4 {
     DMat4::from_cols_array_2d(&[x, y, z, [0.0, 0.0, 0.0, 1.0]]).transpose()
 }
 
-/// What transforms.json holds once for all frames, and any frame may hold for itself.
+/// Intrinsics, which transforms.json gives once for all frames and may override for a frame.
 #[derive(Clone, Default, Deserialize)]
 struct Intrinsics {
     camera_model: Option<String>,
@@ -72,7 +72,7 @@ struct Intrinsics {
     fl_y: Option<f64>,
     cx: Option<f64>,
     cy: Option<f64>,
-    /// Horizontal field of view in radians.
+    /// The horizontal field of view in radians.
     camera_angle_x: Option<f64>,
     camera_angle_y: Option<f64>,
     k1: Option<f64>,
@@ -87,7 +87,7 @@ struct Intrinsics {
 struct Frame {
     #[serde(default)]
     file_path: String,
-    /// Camera to world, with OpenGL's camera: columns right, up, back and position.
+    /// The rows of camera to world, with OpenGL's camera: columns right, up, back and position.
     transform_matrix: Vec<[f64; 4]>,
     #[serde(flatten)]
     intrinsics: Intrinsics,
@@ -127,7 +127,7 @@ impl Frame {
             .or_else(|| of_angle(own.camera_angle_y.or(shared.camera_angle_y), size[1]));
         let whole = model == Model::Equirectangular;
         let (fx, fy) = if whole {
-            // A panorama fills its picture, whatever the file says.
+            // A panorama fills its picture, whatever intrinsics the file gives.
             (
                 Some(size[0] / std::f64::consts::TAU),
                 Some(size[1] / std::f64::consts::PI),
@@ -176,7 +176,7 @@ impl Frame {
     }
 }
 
-/// World to camera and the eye, of the rows of an OpenGL camera's matrix.
+/// The rotation from world to camera, and the eye, from the rows of an OpenGL camera's matrix.
 fn pose(rows: [[f64; 4]; 3], placement: Option<&Placement>) -> ([[f64; 3]; 3], [f64; 3]) {
     let rows = match placement {
         None => rows,
@@ -206,14 +206,14 @@ pub(super) struct CameraPath {
 
 #[derive(Deserialize)]
 struct PathFrame {
-    /// Row by row.
+    /// The camera-to-world matrix, row by row.
     camera_to_world: Vec<f64>,
     /// The vertical field of view in degrees.
     fov: f64,
 }
 
 impl CameraPath {
-    /// The views, numbered.
+    /// The views, named by their numbers.
     pub(super) fn views(self, _: &CameraFileOptions) -> Vec<Result<View, ViewError>> {
         let size = [self.render_width, self.render_height];
         let view = |frame: &PathFrame| {
@@ -251,7 +251,7 @@ impl CameraPath {
     }
 }
 
-/// The rotation nearest to what a viewer rounded, if it is near to one.
+/// The rotation nearest to rows that a viewer has rounded; the rows themselves if they are not near to one.
 fn orthonormal(rows: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
     let [right, down, _] = rows.map(DVec3::from_array);
     let right = right.normalize_or_zero();

@@ -1,4 +1,4 @@
-//! What camera files hold: views, options of reading them, and errors.
+//! The views of camera files, the options of reading them, and errors.
 
 use std::io;
 use std::path::PathBuf;
@@ -7,10 +7,10 @@ use thiserror::Error;
 
 use crate::camera::{Camera, DEFAULT_NEAR, Model};
 
-/// The most pixels along an axis that a camera file may claim.
+/// The most pixels along an axis that a camera file may give.
 const MAX_SIZE: f64 = 1e6;
 
-/// How far a rotation's rows may be from orthonormal.
+/// The tolerance for a rotation's rows to be orthonormal.
 const TOLERANCE: f64 = 1e-3;
 
 /// A camera of a file.
@@ -22,7 +22,7 @@ pub struct View {
     pub camera: Camera,
 }
 
-/// Why a camera file could not be read. Displayed as one sentence: file, place, reason.
+/// The reason that a camera file could not be read. Displayed as one sentence: file, place, reason.
 #[derive(Debug, Error)]
 pub enum CameraFileError {
     /// The file cannot be opened or read.
@@ -30,7 +30,7 @@ pub enum CameraFileError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The system's error.
         source: io::Error,
     },
     /// The file is not JSON, or not of this shape.
@@ -38,7 +38,7 @@ pub enum CameraFileError {
     Json {
         /// The file.
         path: PathBuf,
-        /// What is wrong, with line and column.
+        /// The problem, with line and column.
         source: serde_json::Error,
     },
     /// The file is of none of the kinds.
@@ -55,22 +55,22 @@ pub enum CameraFileError {
     Colmap {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The problem.
         reason: String,
     },
-    /// A camera's numbers are not a camera.
+    /// A camera's numbers are invalid.
     #[error("{}: view {view}: {reason}", path.display())]
     View {
         /// The file.
         path: PathBuf,
         /// The camera's index in the file, from 0.
         view: usize,
-        /// What is wrong with it.
+        /// The problem.
         reason: ViewError,
     },
 }
 
-/// What is wrong with a camera of a file.
+/// The problem of a camera in a file.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum ViewError {
     /// The image size is not positive and reasonable.
@@ -95,15 +95,15 @@ pub enum ViewError {
     Model(String),
 }
 
-/// What a camera file leaves to whoever reads it.
+/// Options for facts that a camera file doesn't give.
 #[derive(Clone, Debug)]
 pub struct CameraFileOptions {
-    /// The image size where a transforms.json doesn't give one.
+    /// The image size, for a transforms.json that doesn't give one.
     pub size: [u32; 2],
-    /// nerfstudio's dataparser_transforms.json, which lies beside a trained model: it takes the cameras of a
-    /// transforms.json to where the model is.
+    /// nerfstudio's dataparser_transforms.json of a trained model. It maps the cameras of a transforms.json to the
+    /// model's world.
     pub dataparser: Option<PathBuf>,
-    /// Cameras whose lens distorts are those of an ideal lens.
+    /// True to replace a lens with distortion by an ideal one.
     pub undistorted: bool,
 }
 
@@ -112,11 +112,11 @@ pub struct CameraFileOptions {
 pub struct CameraFile {
     /// The cameras, in the file's order; COLMAP's in the order of their names.
     pub views: Vec<View>,
-    /// What the file says and nothing heeds, a sentence each.
+    /// Parts of the file that are ignored, a sentence each.
     pub ignored: Vec<String>,
 }
 
-/// What a lens does to the picture of a perfect one: OpenCV's radial and tangential coefficients.
+/// The distortion of a lens: OpenCV's radial and tangential coefficients.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Distortion {
     pub(super) radial: [f64; 4],

@@ -1,4 +1,4 @@
-//! The trait of a scene format, and the input that it reads.
+//! The trait of a scene format, and its input.
 
 use std::io::{self, BufRead, BufReader, ErrorKind, Read};
 use std::path::{Component, Path};
@@ -8,13 +8,13 @@ use flate2::bufread::GzDecoder;
 use crate::error::{Fault, Place, Reason};
 use crate::scene::Scene;
 
-/// Deflate's highest ratio of expansion; no honest header claims more.
+/// Deflate's highest ratio of expansion. A header that claims more is malformed.
 pub(super) const MAX_EXPANSION: u64 = 1032;
 
 /// The first bytes of a gzip stream.
 pub(super) const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
 
-/// What a caller asks of a reader.
+/// The options of a reader.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Options {
     /// The level of detail of a scene that has several (streamed SOG): 0 is the finest.
@@ -29,39 +29,39 @@ pub(super) trait Format: Sync {
     /// Extensions of file names, lower case, without the first dot.
     fn extensions(&self) -> &'static [&'static str];
 
-    /// First bytes that only this format has, where there are any.
+    /// The first bytes that only this format has, if there are any.
     fn magic(&self) -> Option<&'static [u8]> {
         None
     }
 
     /// Reads a whole scene.
     ///
-    /// # Errors
-    /// If the input is malformed; nothing of a size that the input cannot hold is allocated.
+    /// # Errors Returns an error if the input is malformed. A reader allocates nothing that is larger than the input
+    /// can hold.
     fn load(&self, input: &mut Input<'_>) -> Result<Scene, Fault>;
 }
 
-/// What a [`Format`] reads from: bytes in order, how many there are, and how many have been read.
+/// The input of a [`Format`]: bytes in order, their number, and the number of those that have been read.
 pub(super) struct Input<'a> {
     reader: &'a mut dyn BufRead,
     len: u64,
     position: u64,
-    /// Whether the bytes come out of a gzip stream; `len` is a bound then.
+    /// True if the bytes come out of a gzip stream; then `len` is an upper bound.
     gzip: bool,
     origin: Origin<'a>,
 }
 
-/// Where an input comes from, and what the caller asks for.
+/// The origin of an input: its file, and the caller's options.
 #[derive(Clone, Copy)]
 pub(super) struct Origin<'a> {
     /// The file.
     pub(super) path: &'a Path,
-    /// What the caller asks for.
+    /// The caller's options.
     pub(super) options: &'a Options,
 }
 
 impl Origin<'_> {
-    /// Reads the file `name` beside the input's.
+    /// Reads the file `name` in the folder of the input.
     pub(super) fn companion(&self, name: &str) -> Result<Vec<u8>, Fault> {
         let at = |reason: Reason| reason.at(Place::Entry(name.to_owned()));
         if !is_local(name) {
@@ -92,27 +92,27 @@ impl<'a> Input<'a> {
         }
     }
 
-    /// Where the input comes from.
+    /// The origin of the input.
     pub(super) fn origin(&self) -> Origin<'a> {
         self.origin
     }
 
-    /// The size in bytes; of what a gzip stream holds, the most that it may be.
+    /// The size in bytes; for the contents of a gzip stream, an upper bound.
     pub(super) fn size(&self) -> u64 {
         self.len
     }
 
-    /// Whether the bytes come out of a gzip stream.
+    /// True if the bytes come out of a gzip stream.
     pub(super) fn is_compressed(&self) -> bool {
         self.gzip
     }
 
-    /// Bytes that have not been read, at most.
+    /// The most bytes that have not been read.
     pub(super) fn remaining(&self) -> u64 {
         self.len.saturating_sub(self.position)
     }
 
-    /// Fills `buffer`.
+    /// Reads bytes to fill `buffer`.
     pub(super) fn fill(&mut self, buffer: &mut [u8]) -> Result<(), Fault> {
         let position = self.position;
         let gzip = self.gzip;
@@ -120,7 +120,7 @@ impl<'a> Input<'a> {
             .map_err(|error| read_fault(error, position, gzip))
     }
 
-    /// Reads `len` bytes, which are allocated as they come.
+    /// Reads `len` bytes, which are allocated as they are read.
     pub(super) fn bytes(&mut self, len: u64) -> Result<Vec<u8>, Fault> {
         let bytes = self.up_to(len)?;
         if (bytes.len() as u64) < len {
@@ -129,12 +129,12 @@ impl<'a> Input<'a> {
         Ok(bytes)
     }
 
-    /// Reads all there is.
+    /// Reads all remaining bytes.
     pub(super) fn rest(&mut self) -> Result<Vec<u8>, Fault> {
         self.up_to(self.remaining())
     }
 
-    /// Reads at most `len` bytes, which are allocated as they come.
+    /// Reads at most `len` bytes, which are allocated as they are read.
     pub(super) fn up_to(&mut self, len: u64) -> Result<Vec<u8>, Fault> {
         let (position, gzip) = (self.position, self.gzip);
         let known = if gzip { 0 } else { len.min(self.remaining()) };
@@ -144,7 +144,7 @@ impl<'a> Input<'a> {
         })
     }
 
-    /// Appends the next line to `line`, its end included; at most `limit` bytes.
+    /// Appends the next line to `line`, including its end; at most `limit` bytes.
     pub(super) fn line(&mut self, line: &mut Vec<u8>, limit: u64) -> Result<(), Fault> {
         let (position, gzip) = (self.position, self.gzip);
         self.take(limit)
@@ -153,7 +153,7 @@ impl<'a> Input<'a> {
         Ok(())
     }
 
-    /// The input's next bytes.
+    /// The next bytes of the input, which are not consumed.
     pub(super) fn peek(&mut self) -> Result<&[u8], Fault> {
         let (position, gzip) = (self.position, self.gzip);
         self.reader
@@ -161,7 +161,7 @@ impl<'a> Input<'a> {
             .map_err(|error| read_fault(error, position, gzip))
     }
 
-    /// Calls `load` with this input or, if it is a gzip stream, with what that holds. Nothing may follow the stream.
+    /// Calls `load` with this input or, if it is a gzip stream, with its contents. Nothing may follow the stream.
     pub(super) fn unpacked<T>(
         &mut self,
         load: impl FnOnce(&mut Input<'_>) -> Result<T, Fault>,
@@ -175,7 +175,7 @@ impl<'a> Input<'a> {
         let mut inner = Input::new(&mut decoder, len, origin);
         inner.gzip = true;
         let loaded = load(&mut inner)?;
-        // To its end, where its sum is.
+        // Reads the stream to its end, which has its checksum.
         let at = inner.position;
         let mut rest = inner.take(1 << 20);
         io::copy(&mut rest, &mut io::sink()).map_err(|error| read_fault(error, at, true))?;
@@ -189,7 +189,7 @@ impl<'a> Input<'a> {
     }
 }
 
-/// Whether `name` is that of a file in a folder or below it, on any system.
+/// True if `name` is the name of a file in a folder or below it, on any system.
 pub(super) fn is_local(name: &str) -> bool {
     const DEVICES: [&str; 4] = ["con", "prn", "aux", "nul"];
     let device = |part: &str| {
@@ -209,8 +209,8 @@ pub(super) fn is_local(name: &str) -> bool {
         && !name.split('/').any(device)
 }
 
-/// Reads at most `len` bytes. Room for `known` of them is made at once, for the others as they come: a size that is only
-/// claimed costs nothing.
+/// Reads at most `len` bytes. Memory for `known` of them is reserved at once, for the others as they are read, so that
+/// a claimed size costs nothing.
 pub(super) fn read_growing(reader: impl Read, len: u64, known: u64) -> io::Result<Vec<u8>> {
     const STEP: usize = 1 << 20;
     let no_memory = |_| io::Error::from(ErrorKind::OutOfMemory);
@@ -227,14 +227,14 @@ pub(super) fn read_growing(reader: impl Read, len: u64, known: u64) -> io::Resul
         if bytes.capacity() - bytes.len() < step {
             bytes.try_reserve_exact(step).map_err(no_memory)?;
         }
-        // `read_to_end` grows only beyond the room that there is now.
+        // `read_to_end` grows only beyond the capacity.
         if (&mut reader).take(step as u64).read_to_end(&mut bytes)? < step {
             return Ok(bytes);
         }
     }
 }
 
-/// The fault of an `error` met when reading at byte `position`, out of a gzip stream or not.
+/// The fault of an `error` in reading at byte `position`, in a gzip stream or not.
 fn read_fault(error: io::Error, position: u64, gzip: bool) -> Fault {
     match error.kind() {
         ErrorKind::UnexpectedEof => Reason::Truncated.at(Place::Byte(position)),

@@ -1,10 +1,10 @@
 //! The `.ksplat` format of mkkellogg's viewer, versions 0.1 and later, compression levels 0 to 2.
 //!
-//! A header of 4096 bytes, one of 1024 for each section, then the sections: sizes of buckets that are not full, the
-//! buckets' centres, and records. A record is position, scale (linear), quaternion w, x, y, z, colour and opacity (4
-//! bytes) and the other coefficients, degree by degree, channel by channel. Level 0 has floats. From level 1 on they are
-//! half floats, but positions are 16-bit steps from a bucket's centre; at level 2 coefficients are bytes. The frame is
-//! that of PLY files.
+//! A header of 4096 bytes and one of 1024 for each section are followed by the sections: sizes of partly filled
+//! buckets, the buckets' centres, and records. A record is position, scale (linear), quaternion w, x, y, z, colour and
+//! opacity (4 bytes) and the other coefficients, degree by degree, channel by channel. Level 0 has floats. Levels 1 and
+//! 2 have half floats, but positions are 16-bit steps from a bucket's centre; at level 2 coefficients are bytes. The
+//! frame is that of PLY files.
 
 use half::f16;
 
@@ -61,7 +61,7 @@ struct File<'a> {
     sections: Vec<Section<'a>>,
 }
 
-/// A section whose records are there.
+/// A section whose records are complete.
 struct Section<'a> {
     count: usize,
     degree: u32,
@@ -73,7 +73,7 @@ struct Section<'a> {
     bucket_stride: usize,
     /// The first record of each bucket.
     bucket_starts: Vec<usize>,
-    /// Position steps are this long, and this one is zero.
+    /// The length of a position step; below, the step that means zero.
     step: f32,
     middle: f32,
 }
@@ -139,7 +139,7 @@ impl<'a> File<'a> {
         })
     }
 
-    /// Reads record `index` of `section`: position and shape, and the coefficients into `sh`.
+    /// Reads record `index` of `section`. Returns position and shape, and writes the coefficients to `sh`.
     fn read(
         &self,
         section: &Section<'_>,
@@ -191,7 +191,7 @@ impl<'a> File<'a> {
 }
 
 impl<'a> Section<'a> {
-    /// The section of `header` that begins at byte `start` of `bytes`, and where it ends.
+    /// Parses the section of `header` that begins at byte `start` of `bytes`. Returns also its end.
     fn parse(header: &[u8], bytes: &'a [u8], start: u64, level: u16) -> Result<(Self, u64), Fault> {
         let field = |offset: usize| u64::from(u32_at(header, offset));
         let (count, max_count) = (field(0), field(4));
@@ -223,7 +223,7 @@ impl<'a> Section<'a> {
         );
         let claimed = start + sizes + centres + records;
         let available = bytes.len() as u64;
-        // The records that are there may be fewer than there is room for, in the last section.
+        // The last section may have fewer records than its capacity.
         let needed = start + sizes + centres + stride * count;
         if needed > available {
             return Err(Reason::TooShort {
@@ -261,7 +261,7 @@ impl<'a> Section<'a> {
         Ok((section, claimed.min(available)))
     }
 
-    /// Finds where buckets of `sizes` begin, of which `count` have centres.
+    /// Computes the first record of each bucket, from the `sizes` of the buckets; `count` of them have centres.
     fn find_buckets(&mut self, sizes: impl Iterator<Item = u64>, count: u64) -> Result<(), Fault> {
         let mut next = 0;
         for size in sizes {

@@ -1,4 +1,4 @@
-//! The table of scene formats, the one place that lists them, and reading by it.
+//! The table of scene formats, the only place that lists them, and reading of scenes.
 
 mod gltf;
 mod input;
@@ -28,11 +28,10 @@ pub fn open(path: impl AsRef<Path>) -> Result<Scene, SceneError> {
     open_with(path.as_ref(), &Options::default(), |file, _| file)
 }
 
-/// As [`open`], reading through what `wrap` makes of the file and its size in bytes: a reader that shows progress, say.
-/// Standard input, whose size is unknown, is not wrapped; it is read whole before its format is looked for.
+/// Reads like [`open`], through the reader that `wrap` makes of the file and its size in bytes; it can show progress,
+/// for example. Standard input, whose size is unknown, is not wrapped; it is read whole before its format is chosen.
 ///
-/// # Errors
-/// As [`open`].
+/// # Errors As [`open`].
 pub fn open_with<R: Read>(
     path: &Path,
     options: &Options,
@@ -63,7 +62,7 @@ fn io_error(path: &Path, source: std::io::Error) -> SceneError {
     }
 }
 
-/// The file that holds the scene of the folder `path`; `path` itself if that is no such folder.
+/// The file that holds the scene of the folder `path`; `path` itself if it is not such a folder.
 fn inside(path: &Path) -> PathBuf {
     [sog::META, sog::STREAMED_META]
         .map(|name| path.join(name))
@@ -72,16 +71,15 @@ fn inside(path: &Path) -> PathBuf {
         .unwrap_or_else(|| path.to_owned())
 }
 
-/// Reads a scene of `len` bytes from `reader`; `path` picks the format, names the file in errors, and has the folder of
-/// other files that this one names.
+/// Reads a scene of `len` bytes from `reader`. `path` selects the format, names the file in errors, and gives the
+/// folder of other files that the scene refers to.
 ///
-/// # Errors
-/// As [`open`].
+/// # Errors As [`open`].
 pub fn read(path: &Path, reader: &mut dyn BufRead, len: u64) -> Result<Scene, SceneError> {
     read_with(path, reader, len, &Options::default())
 }
 
-/// As [`read`], with `options`.
+/// Reads like [`read`], with `options`.
 ///
 /// # Errors
 /// As [`open`].
@@ -101,7 +99,7 @@ pub fn read_with(
         .map_err(|fault| fault.of(path))
 }
 
-/// Every format that is known, in the order in which they are tried.
+/// Every known format, in the order in which they are tried.
 static FORMATS: &[&dyn Format] = &[
     &ply::Ply,
     &splat::Splat,
@@ -117,7 +115,7 @@ static FORMATS: &[&dyn Format] = &[
     },
 ];
 
-/// A format that is known by name only.
+/// A format of which only the name is known.
 struct NotRead {
     name: &'static str,
     extensions: &'static [&'static str],
@@ -137,8 +135,8 @@ impl Format for NotRead {
     }
 }
 
-/// The format of the file `path` that begins with `start`: by extension, that of what is compressed if it is `gz`, then
-/// by magic, because a format without magic may begin with any bytes.
+/// The format of the file `path` that begins with `start`. It is chosen by extension (without `gz`), then by magic,
+/// because a format without magic may begin with any bytes.
 fn choose(path: &Path, start: &[u8]) -> Option<&'static dyn Format> {
     let extension = |path: &Path| {
         path.extension()
@@ -161,7 +159,7 @@ fn choose(path: &Path, start: &[u8]) -> Option<&'static dyn Format> {
     by_extension.or_else(by_magic).copied()
 }
 
-/// The extensions of all formats that are known, for messages.
+/// The extensions of all known formats, for messages.
 pub fn known_extensions() -> String {
     FORMATS
         .iter()

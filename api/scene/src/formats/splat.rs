@@ -39,7 +39,7 @@ impl Format for Splat {
     }
 }
 
-/// The position and the shape of a record, whose colour goes to `sh`.
+/// Decodes a record. Returns its position and shape, and writes its colour to `sh`.
 fn gaussian(record: &[u8; RECORD], sh: &mut [[f32; 3]]) -> ([f32; 3], GaussianShape) {
     let float =
         |index: usize| f32::from_le_bytes(std::array::from_fn(|byte| record[4 * index + byte]));

@@ -4,7 +4,7 @@
 //! stream for each array. Positions are 24-bit fixed point (version 1: half floats), scales logarithms in sixteenths,
 //! quaternions their first (versions 1 and 2) or smallest three components, opacities bytes, colours bytes over a range
 //! wider than 0 to 1, other coefficients bytes over -1 to 1. The frame is right-up-back, unless an extension names
-//! another; it is turned half around x, into that of PLY files, as the format's own library does when asked for it.
+//! another. It is rotated half a turn around x, into that of PLY files, as the format's own library does on request.
 
 use std::f32::consts::FRAC_1_SQRT_2;
 
@@ -39,16 +39,16 @@ const READ_VERSIONS: &str = "1 to 4";
 /// The range of colour bytes is 1 / 0.15 wide, in units of the constant coefficient.
 const COLOUR_SCALE: f32 = 0.15;
 
-/// The ratio up to which the format's library believes that version 4's positions are compressed.
+/// The highest compression ratio of version 4's positions that the format's library accepts.
 const MAX_RATIO: u64 = 1024;
 
-/// Bytes of extension records that are read, at most.
+/// The most bytes of extension records that are read.
 const MAX_EXTENSIONS: u64 = 1 << 20;
 
-/// Set in the header's flags if the Gaussians were trained with a filter that opacity pays for.
+/// The header flag of Gaussians trained with compensated antialiasing.
 const FLAG_ANTIALIASED: u8 = 1;
 
-/// Set in the header's flags if there are extension records.
+/// The header flag of extension records.
 const FLAG_EXTENSIONS: u8 = 2;
 
 /// Adobe's extension of the frame that a file is in.
@@ -118,7 +118,7 @@ fn load_gzip(input: &mut Input<'_>, into: CoordinateSystem) -> Result<Scene, Fau
     header.unpack(arrays, &Extensions::parse(&records), into)
 }
 
-/// Reads version 4, and refuses others.
+/// Reads version 4. Other versions are an error.
 fn load_plain(input: &mut Input<'_>, into: CoordinateSystem) -> Result<Scene, Fault> {
     let size = input.size();
     let start = input.up_to(PLAIN_HEADER as u64)?;
@@ -180,7 +180,7 @@ fn load_plain(input: &mut Input<'_>, into: CoordinateSystem) -> Result<Scene, Fa
     parsed.unpack(arrays.each_ref().map(Vec::as_slice), &extensions, into)
 }
 
-/// What the zstd stream `compressed` holds: `len` bytes, neither fewer nor more.
+/// The contents of the zstd stream `compressed`, which must be `len` bytes.
 fn zstd(compressed: &[u8], len: u64) -> Result<Vec<u8>, Reason> {
     let decoder = StreamingDecoder::new(compressed).map_err(|e| Reason::Zstd(one_line(&e)))?;
     let bytes = read_growing(decoder, len + 1, 0).map_err(|e| match e.kind() {
@@ -194,7 +194,7 @@ fn zstd(compressed: &[u8], len: u64) -> Result<Vec<u8>, Reason> {
     Ok(bytes)
 }
 
-/// A message of another library, in one line.
+/// Another library's message, on one line.
 pub(super) fn one_line(error: &dyn std::fmt::Display) -> String {
     error
         .to_string()
@@ -209,7 +209,7 @@ fn version(found: u32) -> Fault {
     Reason::Version { found, read }.at(Place::Header("version"))
 }
 
-/// What the extension records say.
+/// The contents of the extension records.
 #[derive(Default)]
 struct Extensions {
     coordinates: Option<CoordinateSystem>,
@@ -217,8 +217,8 @@ struct Extensions {
 }
 
 impl Extensions {
-    /// Records of type, size in bytes, and content; what is not a whole record is passed over, as by the format's
-    /// library.
+    /// Parses records of type, size in bytes, and content. Bytes that are not a whole record are ignored, as by the
+    /// format's library.
     fn parse(mut records: &[u8]) -> Self {
         let mut extensions = Self::default();
         while let Some((head, rest)) = records.split_first_chunk::<8>() {
@@ -255,18 +255,18 @@ impl Extensions {
     }
 }
 
-/// A frame, by the number that the format's library has for it: less one, bits for x that points right, for the height
-/// that points up, and for the depth. Of the first eight, y is the height and z the depth, to the front with its bit; of
-/// the others, z is the height and y the depth, to the back with its bit.
+/// A frame, by its number in the format's library. The number minus one has three bits: x points right, the height
+/// points up, and the depth's direction. Up to number 8, y is the height and z the depth, which points to the front if
+/// its bit is set; above, z is the height and y the depth, which points to the back if its bit is set.
 #[derive(Clone, Copy)]
 pub(super) struct CoordinateSystem(u32);
 
 impl CoordinateSystem {
-    /// That of SPZ files.
+    /// The frame of SPZ files.
     const RIGHT_UP_BACK: Self = Self(4);
-    /// That of [`Scene`]s.
+    /// The frame of [`Scene`]s.
     pub(super) const RIGHT_DOWN_FORWARD: Self = Self(6);
-    /// The one that glTF's draft extensions demand.
+    /// The frame that glTF's draft extensions require.
     pub(super) const LEFT_UP_FRONT: Self = Self(7);
 
     /// The matrix from this frame to right-up-front.
@@ -337,7 +337,8 @@ impl Header {
         }
     }
 
-    /// Bytes of one Gaussian in the arrays of positions, opacities, colours, scales, rotations and other coefficients.
+    /// Bytes of one Gaussian in each of the arrays of positions, opacities, colours, scales, rotations and other
+    /// coefficients.
     fn strides(&self) -> [usize; 6] {
         let position = if self.version == 1 { 6 } else { 9 };
         let rotation = if self.version < 3 { 3 } else { 4 };
@@ -345,13 +346,13 @@ impl Header {
         [position, 1, 3, 3, rotation, rest]
     }
 
-    /// Bytes of the arrays.
+    /// The sizes of the arrays in bytes.
     fn sizes(&self) -> [u64; 6] {
         self.strides()
             .map(|stride| stride as u64 * u64::from(self.count))
     }
 
-    /// The scene of `arrays`, which have [`Header::sizes`], in the frame `into`.
+    /// Decodes `arrays`, which have [`Header::sizes`], to a scene in the frame `into`.
     fn unpack(
         &self,
         arrays: [&[u8]; 6],
@@ -405,7 +406,7 @@ fn scale(byte: u8) -> f32 {
     (f64::from(byte) / 16.0 - 10.0).exp() as f32
 }
 
-/// The quaternion w, x, y, z.
+/// Decodes a quaternion w, x, y, z.
 fn rotation(bytes: &[u8]) -> [f32; 4] {
     let [x, y, z, w] = match *bytes {
         [a, b, c, d] => smallest_three(u32::from_le_bytes([a, b, c, d])),
@@ -420,14 +421,14 @@ fn complement(components: &[f32]) -> f32 {
     (1.0 - squares).max(0.0).sqrt()
 }
 
-/// Quaternion x, y, z, w from bytes of x, y and z; w is not negative.
+/// Decodes a quaternion x, y, z, w from bytes of x, y and z; w is not negative.
 fn first_three(bytes: &[u8]) -> [f32; 4] {
     let xyz: [f32; 3] = std::array::from_fn(|i| f32::from(bytes[i]) / 127.5 - 1.0);
     [xyz[0], xyz[1], xyz[2], complement(&xyz)]
 }
 
-/// Quaternion x, y, z, w from the index of the largest component (two bits) and the others (a
-/// sign and nine bits each, the first highest).
+/// Decodes a quaternion x, y, z, w from the index of the largest component (two bits) and the others (a sign and nine
+/// bits each, the first highest).
 fn smallest_three(word: u32) -> [f32; 4] {
     let which = (word >> 30) as usize;
     let small = [20, 10, 0].map(|shift| {

@@ -1,4 +1,4 @@
-//! What the garden is painted with: splats with y up become Gaussians of a scene.
+//! Builds the garden from splats, which have y up, and converts them to Gaussians of a scene.
 
 use glam::{DQuat, DVec3};
 use rand::{Rng, SeedableRng};
@@ -17,8 +17,8 @@ pub(super) struct Splat {
     pub(super) scale: DVec3,
     pub(super) opacity: f64,
     pub(super) colour: DVec3,
-    /// Bright spots that the surface reflects: the direction from the eye in which the reflection
-    /// is seen, and its colour.
+    /// Bright spots that the surface reflects: for each, the direction from the eye in which the reflection is seen,
+    /// and its colour.
     pub(super) shine: Vec<(DVec3, DVec3)>,
 }
 
@@ -36,7 +36,7 @@ impl Splat {
     }
 }
 
-/// A scene in the making, and its chance.
+/// A scene under construction, and its random numbers.
 pub(super) struct Brush {
     rng: ChaCha8Rng,
     scene: Scene,
@@ -54,22 +54,22 @@ impl Brush {
         self.scene
     }
 
-    /// Evenly distributed in `low` to `high`.
+    /// A number evenly distributed from `low` to `high`.
     pub(super) fn even(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.rng.random::<f64>()
     }
 
-    /// Normally distributed with mean 0.
+    /// A number normally distributed with mean 0.
     pub(super) fn normal(&mut self, deviation: f64) -> f64 {
         deviation * normal(&mut self.rng)
     }
 
-    /// A direction, evenly distributed.
+    /// An evenly distributed direction.
     pub(super) fn direction(&mut self) -> DVec3 {
         DVec3::from_array(std::array::from_fn(|_| normal(&mut self.rng))).normalize_or(DVec3::Y)
     }
 
-    /// A point of the disc of `radius` on the ground, evenly distributed.
+    /// An evenly distributed point of the disc of `radius` on the ground.
     pub(super) fn on_disc(&mut self, radius: f64) -> DVec3 {
         let (sin, cos) = self.even(0.0, std::f64::consts::TAU).sin_cos();
         let radius = radius * self.even(0.0, 1.0).sqrt();
@@ -97,7 +97,7 @@ impl Brush {
     }
 }
 
-/// From y up to the scene's frame, y down: half around x.
+/// Converts from y up to the scene's frame, y down: half a turn around x.
 pub(super) fn turn(v: DVec3) -> DVec3 {
     DVec3::new(v.x, -v.y, -v.z)
 }

@@ -1,10 +1,10 @@
-//! The garden's light: a low sun, the sky, and what they do to surfaces.
+//! The garden's light: a low sun, the sky, and the shading of surfaces.
 
 use std::f64::consts::PI;
 
 use glam::DVec3;
 
-/// Towards the sun.
+/// The direction towards the sun.
 pub(super) fn sun() -> DVec3 {
     DVec3::new(-0.66, 0.36, -0.60).normalize()
 }
@@ -27,8 +27,7 @@ pub(super) fn sky(direction: DVec3) -> DVec3 {
         + DVec3::new(1.0, 0.85, 0.55) * towards.powi(90) * 0.9
 }
 
-/// A matte surface's colour: its own, lit by sun, sky and ground. `open` is the part of the light
-/// that reaches it, 0 to 1.
+/// The colour of a matte surface, lit by sun, sky and ground. `open` is the share of light that reaches it, 0 to 1.
 pub(super) fn matte(albedo: DVec3, normal: DVec3, open: f64) -> DVec3 {
     let upwards = 0.5 + 0.5 * normal.y;
     let ambient = GROUNDLIGHT.lerp(SKYLIGHT, upwards);
@@ -36,26 +35,25 @@ pub(super) fn matte(albedo: DVec3, normal: DVec3, open: f64) -> DVec3 {
     albedo * (ambient * (0.35 + 0.65 * open) + direct * open)
 }
 
-/// Leaves also let the light of behind through.
+/// The colour of a leaf, which also lets light from behind through.
 pub(super) fn leaf(albedo: DVec3, normal: DVec3, open: f64) -> DVec3 {
     let through = albedo * SUNLIGHT * 0.8 * (-normal.dot(sun())).max(0.0) * open;
     matte(albedo, normal, open) + through
 }
 
-/// 0 below 0, 1 above 1, smooth between.
+/// A smooth step: 0 below 0, 1 above 1, smooth between.
 pub(super) fn smooth(x: f64) -> f64 {
     let x = x.clamp(0.0, 1.0);
     x * x * (3.0 - 2.0 * x)
 }
 
-/// A brightness that depends on direction alone and is greatest towards an axis: bands 0 to 3 of
-/// a polished surface's reflection of a bright spot.
+/// The strength of bands 0 to 3 of a lobe, a brightness that depends only on the angle to an axis and is greatest along
+/// it: the reflection of a bright spot by a polished surface.
 const LOBE: [f64; 4] = [0.22, 0.44, 0.36, 0.22];
 
-/// The spherical harmonics coefficients, 16 of them, of a lobe of `colour` around `axis` (as
-/// directions from the eye have it).
+/// The 16 spherical harmonics coefficients of a lobe of `colour` around `axis`, a direction from the eye.
 pub(super) fn lobe(axis: DVec3, colour: DVec3) -> [DVec3; 16] {
-    // By the addition theorem, band l of a lobe is the basis' values on its axis, times this.
+    // By the addition theorem, band l of a lobe is the basis at its axis times this factor.
     let basis = basis(axis);
     std::array::from_fn(|k| {
         let l = k.isqrt();
@@ -63,7 +61,7 @@ pub(super) fn lobe(axis: DVec3, colour: DVec3) -> [DVec3; 16] {
     })
 }
 
-/// `direction` mirrored on a surface with `normal`.
+/// `direction` reflected by a surface with `normal`.
 pub(super) fn mirror(direction: DVec3, normal: DVec3) -> DVec3 {
     direction - 2.0 * direction.dot(normal) * normal
 }
@@ -96,7 +94,7 @@ pub(super) fn basis(direction: DVec3) -> [f64; 16] {
 mod tests {
     use super::*;
 
-    /// The basis is orthonormal: a sum over many even directions is the integral.
+    /// Tests that the basis is orthonormal: a sum over many even directions approximates the integral.
     #[test]
     fn the_basis_is_orthonormal() {
         let count = 20_000;

@@ -1,9 +1,7 @@
-//! The scene that is drawn when none is given: a garden at sunset, with a knot of polished metal
-//! over a pond.
+//! The default scene: a garden at sunset, with a knot of polished metal over a pond.
 //!
-//! Light is baked into colours, as training does: what is matte into the constant coefficient,
-//! what shines into the higher bands. Everything here is laid out with y up and turned into the
-//! scene's frame as the last step.
+//! Light is baked into colours, as in trained scenes: matte light into the constant coefficient, reflections into the
+//! higher bands. Everything is laid out with y up and converted to the scene's frame as the last step.
 
 mod brush;
 mod directions;
@@ -40,11 +38,9 @@ pub fn scene(seed: u64, count: usize) -> Scene {
     brush.finish()
 }
 
-/// The view that [`scene`] is composed for, unless with another vertical field of
-/// view of `fov` degrees.
+/// The view that [`scene`] is composed for, with another vertical field of view of `fov` degrees if given.
 ///
-/// # Errors
-/// [`CameraError::FieldOfView`] unless `fov` is more than 0 and less than 180.
+/// # Errors Returns [`CameraError::FieldOfView`] unless `fov` is more than 0 and less than 180.
 pub fn camera(fov: Option<f64>, size: [u32; 2]) -> Result<Camera, CameraError> {
     let turn = |v: DVec3| brush::turn(v).to_array();
     Camera::look_at(
@@ -90,7 +86,7 @@ mod tests {
                 .is_some_and(|[x, y]| (0.0..1280.0).contains(&x) && (0.0..720.0).contains(&y))
         });
         assert!(seen.count() > 10_000);
-        // The sky is above: at smaller y.
+        // The sky is above, at smaller y.
         let [x, y] = camera.project([0.0, -20.0, 50.0]).expect("in front");
         assert!((0.0..1280.0).contains(&x) && y < 360.0);
     }

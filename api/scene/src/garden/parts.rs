@@ -1,4 +1,4 @@
-//! What is in the garden. Each function paints exactly `count` splats.
+//! The parts of the garden. Each function paints exactly `count` splats.
 
 use std::f64::consts::TAU;
 
@@ -8,13 +8,13 @@ use super::brush::{Brush, Splat};
 use super::directions::{facing, spread};
 use super::light::{leaf, matte, mirror, sky as sky_colour, smooth, sun};
 
-/// The pond's radius; its centre is the origin, its water the height 0.
+/// The radius of the pond, whose centre is the origin and whose water has height 0.
 const POND: f64 = 1.75;
 
-/// How far the meadow reaches.
+/// The radius of the meadow.
 const MEADOW: f64 = 42.0;
 
-/// A tree: where it stands, its height, and its leaves' colours in shade and in light.
+/// A tree: its position, its height, and its leaves' colours in shade and in light.
 struct Tree {
     x: f64,
     z: f64,
@@ -69,7 +69,7 @@ fn ground_normal(x: f64, z: f64) -> DVec3 {
     DVec3::new(-slope(step, 0.0), 1.0, -slope(0.0, step)).normalize()
 }
 
-/// The part of the sunlight that the trees let through to the ground.
+/// The share of the sunlight that the trees let through to the ground.
 fn shade(x: f64, z: f64) -> f64 {
     TREES.iter().fold(1.0, |open, tree| {
         // The crown's shadow lies opposite the sun.
@@ -86,7 +86,7 @@ fn shade(x: f64, z: f64) -> f64 {
     })
 }
 
-/// What is far off fades into the light over the horizon.
+/// The colour at a distance, which fades into the light over the horizon.
 fn haze(colour: DVec3, position: DVec3) -> DVec3 {
     let distance = position.length();
     let along = DVec3::new(position.x, 0.06 * distance, position.z).normalize_or(DVec3::Y);
@@ -96,7 +96,7 @@ fn haze(colour: DVec3, position: DVec3) -> DVec3 {
     )
 }
 
-/// The sky: large soft splats on a far dome.
+/// Paints the sky: large soft splats on a far dome.
 pub(super) fn sky(brush: &mut Brush, count: usize) {
     let radius = 90.0;
     // A quarter of the sphere's points would lie far below the horizon.
@@ -116,11 +116,11 @@ pub(super) fn sky(brush: &mut Brush, count: usize) {
     }
 }
 
-/// Ground and grass: denser near the pond, larger far away.
+/// Paints ground and grass: denser near the pond, larger far away.
 pub(super) fn meadow(brush: &mut Brush, count: usize) {
     for i in 0..count {
         let (sin, cos) = brush.even(0.0, TAU).sin_cos();
-        // An equal number at every scale of distance from the pond's bank.
+        // The same number at every scale of distance from the pond's bank.
         let reach = brush.even(0.0, 1.0).powf(1.3);
         let from_centre = (POND - 0.05) * (MEADOW / (POND - 0.05)).powf(reach);
         let (x, z) = (from_centre * cos, from_centre * sin);
@@ -156,7 +156,7 @@ pub(super) fn meadow(brush: &mut Brush, count: usize) {
     }
 }
 
-/// Flowers in patches: a few petals each.
+/// Paints flowers in patches: a few petals each.
 pub(super) fn flowers(brush: &mut Brush, count: usize) {
     const COLOURS: [DVec3; 5] = [
         DVec3::new(0.95, 0.93, 0.88),
@@ -193,7 +193,7 @@ pub(super) fn flowers(brush: &mut Brush, count: usize) {
     }
 }
 
-/// Trees: near ones get most of the leaves.
+/// Paints trees: near ones get most of the leaves.
 pub(super) fn trees(brush: &mut Brush, count: usize) {
     let weight = |tree: &Tree| 1.0 / (1.0 + 0.10 * tree.x.hypot(tree.z + 4.0).powi(2)).sqrt();
     let total: f64 = TREES.iter().map(weight).sum();
@@ -263,8 +263,8 @@ fn grow(brush: &mut Brush, tree: &Tree, count: usize) {
     }
 }
 
-/// The pond: a dark bowl under clear water that mirrors sun and sky, and a few lily pads. What
-/// [`knot`] paints upside down is seen through the water as its reflection.
+/// Paints the pond: a dark bowl under clear water that mirrors sun and sky, and a few lily pads. The upside-down knot
+/// that [`knot`] paints is seen through the water as the knot's reflection.
 pub(super) fn pond(brush: &mut Brush, count: usize) {
     let (pads, bowl) = (count / 14, count / 4);
     for i in 0..count {
@@ -320,7 +320,7 @@ fn water(brush: &mut Brush) -> Splat {
     splat
 }
 
-/// Motes of warm light over the pond.
+/// Paints small warm lights over the pond.
 pub(super) fn fireflies(brush: &mut Brush, count: usize) {
     for _ in 0..count {
         let mut position = brush.on_disc(POND + 1.6);
@@ -335,14 +335,14 @@ pub(super) fn fireflies(brush: &mut Brush, count: usize) {
     }
 }
 
-/// A torus knot of polished metal, whose tone changes along its course, and its mirror image.
+/// Paints a torus knot of polished metal, whose tone changes along its course, and its mirror image.
 pub(super) fn knot(brush: &mut Brush, count: usize) {
     let image = count / 5;
     paint_knot(brush, count - image, false);
     paint_knot(brush, image, true);
 }
 
-/// The knot's middle line at `t`, which goes from 0 to 2 pi.
+/// The knot's centre line at `t`, from 0 to 2 pi.
 fn course(t: f64) -> DVec3 {
     let (angle, around) = (2.0 * t, 3.0 * t);
     let radius = 0.62 + 0.26 * around.cos();
@@ -375,7 +375,7 @@ fn paint_knot(brush: &mut Brush, count: usize, mirrored: bool) {
         let mut splat = Splat::new(here + normal * TUBE, size, DVec3::ZERO);
         splat.opacity = 0.97;
         splat.colour = metal * (matte(DVec3::splat(0.42), normal, 0.9) + DVec3::splat(0.02));
-        // Seen in the surface: the sun, the bright horizon around it, and the sky above.
+        // The sun, the bright horizon around it, and the sky above, as seen in the surface.
         splat.shine = vec![
             (mirror(sun(), normal), metal * DVec3::new(1.5, 1.2, 0.9)),
             (mirror(horizon, normal), metal * DVec3::new(0.7, 0.5, 0.4)),

@@ -14,12 +14,12 @@ const ROTATIONS: [f32; 8] = [0.1, 0.2, 0.3, 0.9, 0.0, 0.0, 0.0, 1.0];
 const SCALES: [f32; 6] = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6];
 const OPACITIES: [f32; 2] = [0.25, 1.0];
 
-/// Coefficient `k` of both.
+/// Coefficient `k` of both Gaussians.
 fn coefficient(k: usize) -> [f32; 6] {
     std::array::from_fn(|i| 0.1 * (k as f32 + 1.0) + 0.01 * i as f32)
 }
 
-/// A document that grows attribute by attribute, and its buffer.
+/// A document to which attributes are added one by one, with its buffer.
 struct Builder {
     document: Value,
     bytes: Vec<u8>,
@@ -93,7 +93,7 @@ impl Builder {
         &mut self.document["nodes"][0]
     }
 
-    /// The binary file.
+    /// The document as a binary file.
     fn glb(mut self) -> Vec<u8> {
         self.document["buffers"][0]["byteLength"] = json!(self.bytes.len());
         let mut json = self.document.to_string().into_bytes();
@@ -123,12 +123,12 @@ impl Builder {
     }
 }
 
-/// A good binary file.
+/// A valid binary file.
 pub fn glb() -> Vec<u8> {
     Builder::new().glb()
 }
 
-/// A good document.
+/// A valid document.
 pub fn gltf() -> Vec<u8> {
     let builder = Builder::new();
     let mut document = builder.document;
@@ -152,7 +152,7 @@ fn gltf_values() {
     for (name, file) in [("a.glb", glb()), ("a.gltf", gltf()), ("a", glb())] {
         let scene = read(name, &file).expect("a good file");
         assert_eq!((scene.len(), scene.sh_degree()), (2, 1), "{name}");
-        // Turned half around x.
+        // Rotated half a turn around x.
         assert_eq!(scene.positions(), [[1.0, -2.0, -3.0], [-4.0, -5.0, -0.5]]);
         let shapes = scene.shapes();
         assert_eq!(shapes[0].scale, [0.1, 0.2, 0.3]);
@@ -172,7 +172,7 @@ fn gltf_values() {
     }
 }
 
-/// Bytes of `values` as whole numbers of `size` bytes.
+/// `values` as bytes of integers of `size` bytes.
 fn whole(size: usize, values: &[i32]) -> Vec<u8> {
     values
         .iter()
@@ -190,7 +190,7 @@ fn every_component_type_of_gltf() {
         let scene = file.load();
         assert_eq!(scene.shapes()[0].rotation, [1.0, 0.0, 1.0, 0.0]);
         assert_eq!(scene.shapes()[1].rotation, [0.0, -1.0, 0.0, 0.0]);
-        // Not as whole numbers.
+        // Integers are refused.
         let mut file = Builder::new();
         file.attribute(ROTATION, 4, (kind, false), &values);
         assert!(matches!(file.refusal().1, Reason::Type { .. }));
@@ -234,7 +234,7 @@ fn every_component_type_of_gltf() {
 
 #[gaurast_runner::test]
 fn nodes_move_gaussians_and_their_colours() {
-    // A quarter turn around z, twice as large, moved.
+    // A quarter turn around z, a scale of two, and a translation.
     let half = std::f64::consts::FRAC_1_SQRT_2;
     let trs = json!({
         "mesh": 0, "translation": [10, 20, 30], "rotation": [0, 0, half, half], "scale": [2, 2, 2],
@@ -246,10 +246,10 @@ fn nodes_move_gaussians_and_their_colours() {
         let mut file = Builder::new();
         *file.node() = node;
         let scene = file.load();
-        // (x, y, z) becomes (10 - 2y, 20 + 2x, 30 + 2z), which is turned half around x.
+        // (x, y, z) becomes (10 - 2y, 20 + 2x, 30 + 2z), which is rotated half a turn around x.
         close(&scene.positions()[0], &[6.0, -22.0, -36.0], 1e-5);
         close(&scene.shapes()[0].scale, &[0.2, 0.4, 0.6], 1e-6);
-        // x becomes y: coefficients are of -y, z and -x.
+        // x becomes y: the coefficients are those of -y, z and -x.
         let [y, z, x] = [1, 2, 3].map(coefficient);
         let c =
             |values: [f32; 6], sign: f32| [sign * values[0], sign * values[1], sign * values[2]];
@@ -257,7 +257,7 @@ fn nodes_move_gaussians_and_their_colours() {
         close(&scene.sh()[2], &c(z, -1.0), 1e-6);
         close(&scene.sh()[3], &c(y, -1.0), 1e-6);
     }
-    // A child's transform is within its parent's.
+    // A child's transform is relative to its parent's.
     let mut file = Builder::new();
     *file.node() = json!({"children": [1], "translation": [1, 0, 0]});
     let nodes = file.document["nodes"].as_array_mut().expect("nodes");
@@ -353,7 +353,7 @@ fn what_gltf_says_is_told_or_refused() {
     let (place, reason) = file.refusal();
     assert_eq!(place, Place::Part(format!("mesh 0, primitive 0, {name}")));
     assert!(matches!(reason, Reason::Missing));
-    // Meshes of triangles are passed over, and a file of nothing else is refused.
+    // Meshes of triangles are ignored, and a file with nothing else is refused.
     let mut file = Builder::new();
     file.primitive()["extensions"] = json!({});
     assert!(matches!(file.refusal().1, Reason::Unsupported(_)));
@@ -384,7 +384,7 @@ fn spz_in_gltf_is_a_draft_that_is_read() {
         }
         file.document["extensionsRequired"] = json!([name]);
         let scene = file.load();
-        // The drafts want left-up-front, half a turn around y away from SPZ's own frame.
+        // The drafts use left-up-front, which is half a turn around y from SPZ's own frame.
         let [x, y, z] = plain.positions()[0];
         assert_eq!(scene.positions(), [[-x, y, -z]]);
         assert_eq!(scene.shapes()[0].scale, plain.shapes()[0].scale);
@@ -420,7 +420,7 @@ fn malformed_binary_gltf_is_refused() {
     }
 }
 
-/// The real file has signed scales in four of its primitives, which the extension doesn't have.
+/// Tests a real file, which has signed scales in four of its primitives; the extension doesn't allow them.
 #[gaurast_runner::test]
 fn a_real_gltf_is_read_without_its_signed_scales() {
     for name in [

@@ -6,7 +6,8 @@ use half::f16;
 
 use super::support::*;
 
-/// Three Gaussians of degree 2 at compression level `level`: a section of two buckets, one full with two of them.
+/// A file of three Gaussians of degree 2 at compression level `level`: a section of two buckets, a full one with two of
+/// them.
 pub fn file(level: u16) -> Vec<u8> {
     let mut header = vec![0; 4096 + 1024];
     header[1] = 1;
@@ -145,7 +146,7 @@ fn malformed_ksplat_is_refused_with_place_and_reason() {
         refused(4096 + 40, &[4]).1,
         Reason::Range { found: 4, .. }
     ));
-    // Buckets that hold fewer than there are.
+    // Buckets whose capacity is less than the number of records.
     assert!(matches!(
         refused(4096 + 8, &[1]).1,
         Reason::Count {

@@ -1,4 +1,4 @@
-//! Scene files: real ones, small ones with known values, malformed ones, and damaged ones.
+//! Tests of scene files: real ones, small ones with known values, malformed ones, and damaged ones.
 
 mod gltf;
 mod ksplat;
@@ -112,7 +112,7 @@ fn formats_that_are_not_read_and_unknown_ones_are_named() {
     assert!(matches!(missing, SceneError::Io { .. }));
 }
 
-/// Small good files of every kind.
+/// Small valid files of every kind.
 fn good_files() -> Vec<(&'static str, Vec<u8>)> {
     let (properties, rows) = distinct(1, 2);
     let spz = [spz_header(3, 2, 1, 0), vec![99; 2 * 29]].concat();
@@ -176,7 +176,7 @@ fn compressed_files_are_what_they_hold() {
     assert!(matches!(refusal("a.ply.gz", &bad_sum).1, Reason::Gzip(_)));
     let junk = [gzip(&plain), b"JUNK".to_vec()].concat();
     assert!(matches!(refusal("a.ply.gz", &junk).1, Reason::Trailing));
-    // A header that claims more than so few bytes could be, and a bomb after a good scene.
+    // A header that claims more than the file can hold, and a gzip bomb after a valid scene.
     let text = String::from_utf8_lossy(&plain[..60]).replace("vertex 3", "vertex 99999999");
     let claim = gzip(&[text.as_bytes(), &plain[60..]].concat());
     assert!(matches!(
@@ -195,7 +195,7 @@ proptest! {
         ..ProptestConfig::default()
     })]
 
-    /// No flip of bytes makes a reader panic, or hold more than the file could.
+    /// Tests that no change of bytes makes a reader panic, or use more memory than the file could need.
     #[gaurast_runner::test]
     fn flipped_bytes_never_panic(
         which in 0_usize..15,
@@ -212,7 +212,7 @@ proptest! {
         }
     }
 
-    /// The same inside what has a sum, where a flip outside seldom gets further than to that.
+    /// Tests the same inside of files with checksums, where a change from outside rarely gets past the checksum.
     #[gaurast_runner::test]
     fn flipped_bytes_within_archives_never_panic(
         which in 0_usize..PARTS.len(),
@@ -237,7 +237,7 @@ type Pack = fn(&[(String, Vec<u8>)]) -> Vec<u8>;
 /// A file's name, its packer, and its parts.
 type Packed = (&'static str, Pack, Vec<(String, Vec<u8>)>);
 
-/// Good files as what they pack.
+/// Valid files as their parts.
 static PARTS: LazyLock<[Packed; 5]> = LazyLock::new(|| {
     let (properties, rows) = distinct(1, 2);
     let spz = |degree, stride: usize| {

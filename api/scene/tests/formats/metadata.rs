@@ -1,4 +1,4 @@
-//! What files say of themselves.
+//! Tests of the metadata of scene files.
 
 use gaurast_runner::data;
 use gaurast_scene::{Antialiasing, Geometry};
@@ -64,7 +64,7 @@ fn ply_comments_say_how_a_scene_was_trained() {
 #[gaurast_runner::test]
 fn a_ply_without_a_third_scale_holds_surfels() {
     let whole = read("a.ply", &commented(&[], "")).expect("a good file");
-    // Whatever a comment claims.
+    // A comment that says otherwise doesn't matter.
     for comments in [&[][..], &["SplatRenderMode: default"]] {
         let flat = read("a.ply", &commented(comments, "scale_2")).expect("a good file");
         assert_eq!(flat.geometry(), Geometry::Surfel);

@@ -31,7 +31,7 @@ fn ply_values_in_every_encoding_degree_and_order() {
                     }
                 }
             }
-            // The same columns in another order, with a foreign one among them.
+            // The same columns in another order, with an unknown one among them.
             let reversed: Vec<String> = properties
                 .iter()
                 .rev()
@@ -197,7 +197,7 @@ fn good_ply_fixtures_hold_their_values() {
         let k_f = k as f32;
         assert_eq!(scene.sh()[k], [k_f, 100.0 + k_f, 200.0 + k_f]);
     }
-    // Not errors here: degree 4 is held, and what overflows is the device's to skip.
+    // Not errors: degree 4 is supported, and the device skips values that overflow.
     assert_eq!(load("degree-4-sh.ply").sh_degree(), 4);
     let overflow = load("overflow-scale.ply");
     assert_eq!(overflow.shapes()[0].scale[0], f32::INFINITY);
@@ -219,7 +219,7 @@ fn compressed_ply_values() {
     assert_eq!(scene.shapes()[0].opacity, (128.0 / 255.0) as f32);
     let colour = scene.sh()[0].map(|c| 0.5 + SH_C0 * c);
     close(&colour, &[2.0, 0.0, 0.4], 1e-6);
-    // Channel-major; the extremes are exact, other bytes stand for their interval's middle.
+    // Channel by channel; the extremes are exact, other bytes mean the middle of their interval.
     let value = |byte: u8| 8.0 * ((f32::from(byte) + 0.5) / 256.0 - 0.5);
     assert_eq!(scene.sh()[1], [-4.0, value(1), value(4)]);
     assert_eq!(scene.sh()[2], [4.0, value(2), value(5)]);

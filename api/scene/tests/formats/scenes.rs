@@ -1,4 +1,4 @@
-//! Scenes in memory: several in one, and what one holds in numbers.
+//! Tests of scenes in memory: several appended to one, and statistics.
 
 use gaurast_scene::info::Info;
 use gaurast_scene::{Antialiasing, GaussianShape, Scene, Transform};
@@ -39,7 +39,7 @@ fn an_appended_scene_is_scaled_turned_and_moved() {
         });
         let turned = DVec3::new(-old.y, old.x, old.z);
         assert!(new.abs_diff_eq(turned, 1e-5), "{new} is not {turned}");
-        // The basis is -y, z and -x: what x was, y becomes, and what y was, -x.
+        // The basis is -y, z and -x. x becomes y, and y becomes -x.
         let [old, new] = [&part.sh()[4 * i..], &whole.sh()[4 * (2 + i)..]];
         assert_eq!(new[0], old[0]);
         close(&new[1], &old[3], 1e-6);

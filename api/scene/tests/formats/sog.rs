@@ -55,7 +55,7 @@ fn zip(entries: &[(String, Vec<u8>)], deflate: bool) -> Vec<u8> {
     bytes
 }
 
-/// Files of a scene of version 2 or 1: two Gaussians of degree 1 in images of 2x1 pixels.
+/// The files of a scene of version 1 or 2: two Gaussians of degree 1 in images of 2x1 pixels.
 pub fn entries(version: u32) -> Vec<(String, Vec<u8>)> {
     let codebook =
         |scale: f64| -> Vec<f64> { (0..256).map(|i| f64::from(i - 128) * scale).collect() };
@@ -106,7 +106,7 @@ pub fn entries(version: u32) -> Vec<(String, Vec<u8>)> {
     ]
 }
 
-/// The archive of `entries`, not compressed.
+/// An archive of `entries`, not compressed.
 pub fn stored(entries: &[(String, Vec<u8>)]) -> Vec<u8> {
     zip(entries, false)
 }
@@ -120,7 +120,7 @@ fn edited(version: u32, edit: impl FnOnce(&mut Value)) -> Vec<u8> {
     zip(&entries, false)
 }
 
-/// A good archive.
+/// A valid archive.
 pub fn archive(version: u32) -> Vec<u8> {
     edited(version, |_| {})
 }
@@ -131,7 +131,7 @@ fn check_geometry(scene: &Scene) {
     let far = 1_f64.exp_m1() as f32;
     let expected = [
         [-far, 0.0, 2_f64.exp_m1() as f32],
-        // The z of all is one value, whose span counts as one.
+        // All Gaussians have the same z, whose span counts as one.
         [far, 0.5_f64.exp_m1() as f32, 3_f64.exp_m1() as f32],
     ];
     for (found, expected) in scene.positions().iter().zip(&expected) {
@@ -192,7 +192,7 @@ fn sog_values_of_both_versions() {
     close(&scene.sh()[1], &[-0.975, -0.965, -0.955], 1e-6);
 }
 
-/// Opacities, for comparing all at once.
+/// The opacities of a scene, to compare all at once.
 trait EachOpacity {
     fn each_opacity(&self) -> Vec<f32>;
 }
@@ -251,7 +251,7 @@ fn a_sog_folder_is_the_same_as_its_archive() {
     ));
 }
 
-/// A streamed scene: level 0 is both Gaussians of one file, level 1 one of them, and there is an environment.
+/// Writes a streamed scene: level 0 is both Gaussians of one file, level 1 one of them, and there is an environment.
 fn streamed(folder: &Path) {
     let meta = json!({
         "lodLevels": 2,
@@ -402,13 +402,13 @@ fn sog_fixtures_are_what_their_names_say() {
         assert_eq!(error.to_string().lines().count(), 1, "{name}: {error}");
     }
     let load = |name: &str| gaurast_scene::open(fixtures.join(name)).expect(name);
-    // Its second Gaussian's label has no entry.
+    // Its second Gaussian's label is beyond the palette.
     let scene = load("labels-out-of-range.sog");
     assert_eq!((scene.len(), scene.sh_degree()), (2, 1));
     assert_ne!(scene.sh()[1], [0.0; 3]);
     assert_eq!(scene.sh()[5..], [[0.0; 3]; 3]);
     assert_eq!(scene.metadata().notes.len(), 1);
-    // The values that made it, in the frame of PLY files.
+    // The values that the file was made from, in the frame of PLY files.
     let scene = load("kit-multi-degree3.sog");
     assert_eq!((scene.len(), scene.sh_degree()), (3, 3));
     for i in 0..3 {
@@ -435,8 +435,8 @@ fn sog_fixtures_are_what_their_names_say() {
     }
 }
 
-/// The same Gaussians as SOG and as another format, within what both round to: positions by a logarithm in 16 bits,
-/// opacities in 8.
+/// Tests the same Gaussians as SOG and in another format, within the rounding of both: positions by a logarithm in 16
+/// bits, opacities in 8.
 #[gaurast_runner::test]
 fn sog_files_agree_with_the_same_scenes_in_other_formats() {
     let agree = |a: &[f32], b: &[f32], tolerance: f32| {
@@ -468,8 +468,8 @@ fn sog_files_agree_with_the_same_scenes_in_other_formats() {
     }
 }
 
-/// The PLY was decoded from the SOG by the format's own tool: the same Gaussians in the same order, but that its
-/// opacities, which are logits, end at 1/512 and 511/512.
+/// Tests a SOG file against a PLY file that the format's own tool decoded from it: the same Gaussians in the same
+/// order, except that the tool clamps opacities, which are logits in PLY, to 1/512 and 511/512.
 #[gaurast_runner::test]
 fn a_real_sog_has_the_values_that_its_own_tool_decodes() {
     let sog = gaurast_scene::open(data("splats/skull.sog")).expect("a good file");

@@ -18,7 +18,7 @@ fn malformed_spz_is_refused_with_place_and_reason() {
     let (place, reason) = refusal("a.spz", &gzip(&trailing));
     assert_eq!(place, Place::Byte(35));
     assert!(matches!(reason, Reason::Trailing));
-    // With the flag, what follows are extension records.
+    // With the flag, the following bytes are extension records.
     let extended = [good(2), b"EXTRA!".to_vec()].concat();
     assert_eq!(
         read("a.spz", &gzip(&extended)).expect("a good file").len(),
@@ -32,7 +32,7 @@ fn malformed_spz_is_refused_with_place_and_reason() {
     bad_sum[sum] ^= 0xff;
     assert!(matches!(refusal("a.spz", &bad_sum).1, Reason::Gzip(_)));
 
-    // Version 4 is not compressed as a whole, and others are nothing else.
+    // Version 4 is not compressed as a whole, and all other versions are.
     let (place, reason) = refusal("a.spz", &gzip(&spz_header(4, 100, 1, 0)));
     assert_eq!(place, Place::Header("version"));
     assert!(matches!(reason, Reason::Version { found: 4, .. }));
@@ -47,10 +47,10 @@ fn malformed_spz_is_refused_with_place_and_reason() {
     let (_, reason) = refusal("a.spz", &spz_header(5, 100, 1, 0));
     assert!(matches!(reason, Reason::Version { found: 5, .. }));
 
-    // A bomb: the header claims little, and a gigabyte follows.
+    // A gzip bomb: the header claims little, and a gigabyte follows.
     let bomb = [good(2), vec![0; 64 << 20]].concat();
     assert!(matches!(refusal("a.spz", &gzip(&bomb)).1, Reason::Trailing));
-    // And one whose header claims what its size could just hold, but doesn't.
+    // A file whose header claims as much as its size could hold, but which holds less.
     let claim = gzip(&spz_header(2, 1800, 0, 0));
     let (place, reason) = refusal("a.spz", &claim);
     assert!(matches!(
@@ -89,7 +89,7 @@ fn malformed_spz_fixtures_are_refused() {
     }
 }
 
-/// The fixture's four Gaussians sit on the format's grid; these are the formulas that made it.
+/// Tests the fixture's four Gaussians, which are exactly representable; the test repeats the formulas that made it.
 #[gaurast_runner::test]
 fn spz_fixture_holds_the_values_that_made_it() {
     let path = data("fixtures/equiv-degree3-exact-v2.spz");
@@ -140,13 +140,13 @@ fn spz_fixture_holds_the_values_that_made_it() {
     }
 }
 
-/// One Gaussian stored as a PLY file and as SPZ of each version is the same Gaussian.
+/// Tests that one Gaussian stored as a PLY file and as SPZ of each version is read as the same Gaussian.
 #[gaurast_runner::test]
 fn spz_and_ply_of_one_gaussian_agree() {
     let rest: Vec<u8> = (0..45).map(|i| 60 + 3 * i).collect();
     let (colour, scales, opacity) = ([40, 128, 210], [144, 160, 176], 200);
     let half = std::f32::consts::FRAC_1_SQRT_2;
-    // Right-up-back.
+    // The frame is right-up-back.
     let (position, quaternion) = ([0.5, -2.25, 1.0], [half, 0.0, half, 0.0]);
     for version in 1..=3 {
         let mut file = spz_header(version, 1, 3, 0);
@@ -213,7 +213,7 @@ fn good_spz_fixtures_are_read() {
     }
 }
 
-/// Inside the gzip stream of an SPZ file, where a flip outside would only break its sum.
+/// Tests changes inside the gzip stream of an SPZ file; outside, a change would only break its checksum.
 #[gaurast_runner::test]
 fn every_header_byte_of_spz_may_be_anything() {
     let good = [spz_header(2, 1, 1, 0), vec![7; 28]].concat();
@@ -230,7 +230,7 @@ fn every_header_byte_of_spz_may_be_anything() {
 
 /// A zstd frame of `bytes`, not compressed.
 fn zstd(bytes: &[u8]) -> Vec<u8> {
-    // The magic, a descriptor that says that a size of four bytes follows, the size, and a last, raw block.
+    // The magic, a descriptor that announces a size of four bytes, the size, and a last, raw block.
     let mut frame = vec![0x28, 0xb5, 0x2f, 0xfd, 0xa0];
     frame.extend((bytes.len() as u32).to_le_bytes());
     let block = (bytes.len() as u32) << 3 | 1;
@@ -337,7 +337,7 @@ fn malformed_version_4_of_spz_is_refused_with_place_and_reason() {
     let trailing = [good.clone(), vec![0]].concat();
     assert!(matches!(refusal("a.spz", &trailing).1, Reason::Trailing));
 
-    // A stream that holds more than it should, as far as anyone can tell without reading it all.
+    // A stream that holds more than it should, which is only found by reading all of it.
     let mut arrays = arrays(0);
     arrays[0].extend(vec![0; 100_000]);
     let mut file = version_4_of(0, 0, &[], &arrays);
@@ -359,11 +359,11 @@ fn record(kind: u32, content: &[u8]) -> Vec<u8> {
     record
 }
 
-/// Files in each frame that the extension has are one scene, as the format's library turns them.
+/// Tests that files in each of the extension's frames are read as the same scene, as by the format's library.
 #[gaurast_runner::test]
 fn the_frame_that_an_spz_extension_names_is_turned() {
     let plain = read("a.spz", &version_4(4, 0)).expect("a good file");
-    // The axes that x, y and z are, in order: right, down and forward are those of a scene.
+    // For each frame, the directions of x, y and z, in order. A scene's are right, down and forward.
     let frames = [
         "LDB", "RDB", "LUB", "RUB", "LDF", "RDF", "LUF", "RUF", "LFD", "RFD", "LFU", "RFU", "LBD",
         "RBD", "LBU", "RBU",
@@ -391,7 +391,7 @@ fn the_frame_that_an_spz_extension_names_is_turned() {
         assert_eq!(scene.positions()[0], expected, "{frame}");
         assert_eq!(scene.shapes()[0].scale, plain.shapes()[0].scale);
         assert!(scene.metadata().notes.is_empty());
-        // Colours: the function of degree 2 that is z^2 less the others' mean, in the file's frame.
+        // The function of degree 2 that is z^2 minus the mean of x^2 and y^2, in the file's frame.
         let energy = |scene: &gaurast_scene::Scene| -> f32 {
             scene.sh()[4..9].iter().map(|c| c[0] * c[0]).sum()
         };
@@ -399,7 +399,7 @@ fn the_frame_that_an_spz_extension_names_is_turned() {
         if frame == "RUB" {
             assert_eq!(scene, plain);
         }
-        // The gradient of degree 1 points along the file's axes as the positions do.
+        // The gradient of degree 1 rotates with the file's axes, as the positions do.
         let gradient = |sh: &[[f32; 3]]| [-sh[3][1], -sh[1][1], sh[2][1]];
         let [x, y, z] = gradient(plain.sh());
         let mut turned = [0.0; 3];

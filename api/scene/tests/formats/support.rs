@@ -1,4 +1,4 @@
-//! Files made in memory, and what tests say about them.
+//! Files made in memory for the tests, and common assertions.
 
 use std::io::{Cursor, Write};
 use std::path::Path;
@@ -7,12 +7,12 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 use gaurast_scene::{Place, Reason, Scene, SceneError};
 
-/// Whether a reason is the right one.
+/// A check that a reason is the expected one.
 pub type IsReason = fn(&Reason) -> bool;
 
 pub const SH_C0: f32 = 0.282_094_8;
 
-/// Signs of the coefficients of a scene turned half around x, bands 1 to 3.
+/// Signs of the coefficients of a scene rotated half a turn around x, bands 1 to 3.
 pub const TURN: [f32; 15] = [
     -1., -1., 1., -1., 1., 1., -1., 1., -1., 1., -1., -1., 1., -1., 1.,
 ];
@@ -21,7 +21,7 @@ pub fn read(name: &str, bytes: &[u8]) -> Result<Scene, SceneError> {
     gaurast_scene::read(Path::new(name), &mut Cursor::new(bytes), bytes.len() as u64)
 }
 
-/// The place and reason why `bytes` are refused.
+/// The place and reason with which `bytes` are refused.
 #[track_caller]
 pub fn refusal(name: &str, bytes: &[u8]) -> (Place, Reason) {
     match read(name, bytes) {
@@ -156,7 +156,7 @@ pub fn spz_header(version: u32, count: u32, degree: u8, flags: u8) -> Vec<u8> {
     header
 }
 
-/// Equal within `tolerance`.
+/// Asserts that `a` and `b` are equal within `tolerance`.
 #[track_caller]
 pub fn close(a: &[f32], b: &[f32], tolerance: f32) {
     assert_eq!(a.len(), b.len());

@@ -3,8 +3,7 @@
 use super::buffers::Buffers;
 use crate::error::{Fault, Place, Reason};
 
-/// The type of an attribute's components: glTF's `componentType`, and whether whole numbers are fractions of the largest
-/// one.
+/// The type of an attribute's components: glTF's `componentType`, and true if integers are normalized to fractions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Component {
     pub(super) kind: u32,
@@ -18,7 +17,7 @@ pub(super) const UNSIGNED_SHORT: u32 = 5123;
 pub(super) const FLOAT: u32 = 5126;
 
 impl Component {
-    /// Whole numbers as they are, and floats.
+    /// Components that are plain integers, or floats.
     pub(super) const fn plain(kind: u32) -> Self {
         Self {
             kind,
@@ -26,7 +25,7 @@ impl Component {
         }
     }
 
-    /// Whole numbers that are fractions.
+    /// Components that are integers normalized to fractions.
     pub(super) const fn normalized(kind: u32) -> Self {
         Self {
             kind,
@@ -81,17 +80,17 @@ impl Component {
     }
 }
 
-/// What an attribute must be.
+/// The required type of an attribute.
 pub(super) struct Demand {
-    /// Components of an element: of `SCALAR`, `VEC3` and `VEC4`.
+    /// The number of components of an element: 1 for `SCALAR`, 3 for `VEC3`, 4 for `VEC4`.
     pub(super) width: usize,
-    /// Types that its components may have.
+    /// The allowed types of its components.
     pub(super) components: &'static [Component],
-    /// Those types, for messages.
+    /// The allowed types, for messages.
     pub(super) expected: &'static str,
 }
 
-/// The values of accessor `index`, for messages `place`: element after element.
+/// The values of accessor `index`, element after element. Messages name it `place`.
 pub(super) fn values(
     buffers: &mut Buffers<'_>,
     index: usize,
@@ -115,7 +114,7 @@ pub(super) fn values(
     }
     let component = Component {
         kind: accessor.component_type,
-        // Of floats the word says nothing.
+        // For floats, `normalized` has no meaning.
         normalized: accessor.normalized && accessor.component_type != FLOAT,
     };
     if !demand.components.contains(&component) {

@@ -1,4 +1,4 @@
-//! A document's buffers: in a binary file, in the document itself, or in files beside it.
+//! A document's buffers: in a binary file, in the document itself, or in separate files.
 
 use std::borrow::Cow;
 
@@ -13,7 +13,7 @@ pub(super) struct Buffers<'a> {
     pub(super) document: &'a Document,
     /// The first buffer, if a binary file has it.
     binary: Option<&'a [u8]>,
-    /// Buffers, as far as they have been needed.
+    /// The buffers that have been read so far.
     buffers: Vec<Option<Cow<'a, [u8]>>>,
     pub(super) origin: Origin<'a>,
 }
@@ -33,7 +33,7 @@ impl<'a> Buffers<'a> {
         }
     }
 
-    /// The bytes of buffer view `index`, named by `place`, and the distance between its elements.
+    /// The bytes of buffer view `index`, and the distance between its elements. Messages name it `place`.
     pub(super) fn view(
         &mut self,
         index: usize,
@@ -99,7 +99,7 @@ impl<'a> Buffers<'a> {
     }
 }
 
-/// The bytes of `uri`: base64 in it, or a file beside the document.
+/// The bytes of `uri`: base64 data in it, or a file in the document's folder.
 fn resource(uri: &str, origin: Origin<'_>) -> Result<Vec<u8>, Fault> {
     let Some(data) = uri.strip_prefix("data:") else {
         return origin.companion(&percent_decoded(uri));
@@ -117,7 +117,7 @@ fn resource(uri: &str, origin: Origin<'_>) -> Result<Vec<u8>, Fault> {
         .map_err(|_| malformed())
 }
 
-/// `text` with `%` and two hexadecimal digits replaced by the byte that they are.
+/// `text` with each `%` and its two hexadecimal digits replaced by the byte that they encode.
 fn percent_decoded(text: &str) -> String {
     let digit = |byte: Option<&u8>| char::from(*byte?).to_digit(16);
     let bytes = text.as_bytes();

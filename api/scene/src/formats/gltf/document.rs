@@ -10,14 +10,15 @@ use crate::error::{Fault, Place, Reason};
 /// The extension's name.
 pub(super) const EXTENSION: &str = "KHR_gaussian_splatting";
 
-/// Names of draft extensions that keep Gaussians as SPZ, in an object of the extension or, the last one, beside it.
+/// Names of draft extensions that store Gaussians as SPZ: in an object of the extension or, for the last one, next to
+/// it.
 pub(super) const DRAFTS: [&str; 3] = [
     "KHR_gaussian_splatting_compression_spz_2",
     "KHR_gaussian_splatting_compression_spz",
     "KHR_spz_gaussian_splats_compression",
 ];
 
-/// Extensions that a document may require and this reader follows, or that say nothing of Gaussians.
+/// Extensions that a document may require: those that this reader supports, and those that don't concern Gaussians.
 const FOLLOWED: [&str; 5] = [
     EXTENSION,
     "KHR_mesh_quantization",
@@ -26,7 +27,7 @@ const FOLLOWED: [&str; 5] = [
     "KHR_animation_pointer",
 ];
 
-/// Beginnings of names of extensions that say nothing of Gaussians.
+/// Prefixes of names of extensions that don't concern Gaussians.
 const IRRELEVANT: [&str; 2] = ["KHR_materials_", "KHR_texture_"];
 
 /// A document.
@@ -72,7 +73,7 @@ pub(super) struct Node {
     pub(super) children: Vec<usize>,
     pub(super) matrix: Option<[f64; 16]>,
     pub(super) translation: Option<[f64; 3]>,
-    /// x, y, z, w.
+    /// The quaternion x, y, z, w.
     pub(super) rotation: Option<[f64; 4]>,
     pub(super) scale: Option<[f64; 3]>,
 }
@@ -125,7 +126,7 @@ pub(super) struct Buffer {
 }
 
 impl Document {
-    /// Refuses versions and required extensions that are not read.
+    /// Refuses unsupported versions and required extensions.
     pub(super) fn check(&self) -> Result<(), Fault> {
         if !self.asset.version.starts_with("2.") {
             let text = format!(

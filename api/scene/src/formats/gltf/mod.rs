@@ -1,7 +1,8 @@
 //! glTF 2.0 with `KHR_gaussian_splatting`, as JSON (`.gltf`) and as a binary file (`.glb`).
 //!
-//! Every primitive with the extension becomes Gaussians, moved by its node. The frame, right-up-back, is turned half
-//! around x. Draft extensions that keep a primitive's Gaussians as SPZ are read, and said to be drafts.
+//! Every primitive with the extension becomes Gaussians, transformed by its node. The frame, right-up-back, is rotated
+//! half a turn around x. Draft extensions that store a primitive's Gaussians as SPZ are read, and a note names them as
+//! drafts.
 
 mod accessor;
 mod buffers;
@@ -93,7 +94,7 @@ impl Format for Glb {
             match &kind.to_le_bytes() {
                 b"JSON" => chunks[0] = chunks[0].or(Some(chunk)),
                 b"BIN\0" => chunks[1] = chunks[1].or(Some(chunk)),
-                // Chunks of extensions are passed over.
+                // Chunks of extensions are skipped.
                 _ => {}
             }
             rest = after;
@@ -139,12 +140,12 @@ fn load(json: &[u8], binary: Option<&[u8]>, origin: Origin<'_>) -> Result<Scene,
     Ok(scene)
 }
 
-/// A document that is read into a scene, node by node.
+/// Reads a document into a scene, node by node.
 struct Reader<'a> {
     document: &'a Document,
     buffers: Buffers<'a>,
     scene: Scene,
-    /// Nodes that have been visited; each is in a tree once.
+    /// True for each node that has been visited; each is in a tree once.
     visited: Vec<bool>,
     other_primitives: usize,
 }
@@ -167,7 +168,7 @@ fn local(node: &Node) -> DAffine3 {
 }
 
 impl Reader<'_> {
-    /// Reads the Gaussians of node `root` and of those below it, moved by `above` and by their nodes.
+    /// Reads the Gaussians of node `root` and its descendants, transformed by `above` and by their nodes.
     fn visit(&mut self, root: usize, above: DAffine3) -> Result<(), Fault> {
         let mut stack = vec![(root, above)];
         while let Some((index, above)) = stack.pop() {
@@ -195,7 +196,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Reads the Gaussians of mesh `index`, moved by `map`.
+    /// Reads the Gaussians of mesh `index`, transformed by `map`.
     fn mesh(&mut self, index: usize, map: &DAffine3) -> Result<(), Fault> {
         let document = self.document;
         let mesh = document

@@ -1,4 +1,4 @@
-//! A primitive with `KHR_gaussian_splatting`: what the extension says, and its attributes.
+//! A primitive with `KHR_gaussian_splatting`: the extension's object, and its attributes.
 
 use std::collections::HashMap;
 
@@ -20,7 +20,7 @@ use crate::shape::GaussianShape;
 /// The highest spherical harmonics degree of the extension.
 const MAX_DEGREE: u32 = 3;
 
-/// The mode of primitives that are points, all that have Gaussians.
+/// The mode of primitives that are points. All primitives with Gaussians have it.
 const POINTS: u32 = 0;
 
 #[derive(Deserialize)]
@@ -95,7 +95,7 @@ const COEFFICIENT: Demand = Demand {
     expected: "float",
 };
 
-/// The Gaussians of `primitive`, for messages `place`, in the frame of its mesh. None if it has none.
+/// The Gaussians of `primitive`, in the frame of its mesh. None if it has none. Messages name it `place`.
 pub(super) fn gaussians(
     buffers: &mut Buffers<'_>,
     primitive: &Primitive,
@@ -220,7 +220,7 @@ fn attributes(
 }
 
 impl Splatting {
-    /// What the extension says, where that is known.
+    /// The metadata of the extension's object, as far as they are known.
     fn metadata(&self, place: &str) -> Result<Metadata, Fault> {
         let unknown = |what: &str, value: &str, known: &str| {
             let text = format!("the {what} {value:?} is not one that is drawn ({known})");

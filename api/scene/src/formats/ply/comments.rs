@@ -1,11 +1,11 @@
-//! What programs write into a PLY header's comments about how a scene was trained.
+//! Metadata in the comments of a PLY header, which training programs write.
 //!
-//! Brush has `SplatRenderMode: default`, `mip` or `2dgs`; Postshot `antialiased 0` or `1`. Case does not matter, and the
-//! last of them wins.
+//! Brush writes `SplatRenderMode: default`, `mip` or `2dgs`; Postshot `antialiased 0` or `1`. Case does not matter, and
+//! the last of them counts.
 
 use crate::metadata::{Antialiasing, Geometry, Metadata};
 
-/// What `comments`, each without its keyword, say.
+/// The metadata in `comments`, each without its keyword.
 pub(super) fn metadata(comments: &[String]) -> Metadata {
     let mut metadata = Metadata::default();
     for comment in comments {

@@ -20,7 +20,7 @@ use crate::shape::GaussianShape;
 /// Gaussians per chunk.
 const CHUNK: usize = 256;
 
-/// What `chunk` holds: minima and maxima of positions, log-scales and colours.
+/// The properties of `chunk`: minima and maxima of positions, log-scales and colours.
 const BOUNDS: [&str; 18] = [
     "min_x",
     "min_y",
@@ -42,7 +42,7 @@ const BOUNDS: [&str; 18] = [
     "max_b",
 ];
 
-/// The bounds that older files have; their colours are over 0 to 1.
+/// The number of bounds in older files, whose colours range over 0 to 1.
 const BOUNDS_WITHOUT_COLOUR: usize = 12;
 
 const PACKED: [&str; 4] = [
@@ -164,8 +164,8 @@ fn unpack_11_10_11(word: u32) -> [f64; 3] {
     [bits(word, 21, 11), bits(word, 11, 10), bits(word, 0, 11)]
 }
 
-/// The quaternion w, x, y, z: the two highest bits tell which component is the largest, the
-/// other three follow in order, over -1/sqrt(2) to 1/sqrt(2).
+/// Decodes a quaternion w, x, y, z. The two highest bits are the index of the largest component; the other three
+/// components follow in order, over -1/sqrt(2) to 1/sqrt(2).
 fn unpack_rotation(word: u32) -> [f32; 4] {
     let small = [20, 10, 0].map(|shift| (bits(word, shift, 10) - 0.5) / FRAC_1_SQRT_2);
     let largest = (1.0 - small.iter().map(|c| c * c).sum::<f64>())
@@ -183,7 +183,7 @@ fn unpack_rotation(word: u32) -> [f32; 4] {
     })
 }
 
-/// A byte stands for the middle of its interval, the extremes for themselves.
+/// The value of a byte: the middle of its interval, except that the extremes are exact.
 fn sh_value(byte: f64) -> f64 {
     let fraction = match byte {
         0.0 => 0.0,

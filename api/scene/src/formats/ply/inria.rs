@@ -1,8 +1,8 @@
-//! The PLY layout of the original 3DGS code (INRIA's): one `vertex` element, a property a number.
+//! The PLY layout of the original 3DGS code (INRIA's): one `vertex` element, with a property for each number.
 //!
-//! Scales are logarithms, opacities logits, quaternions w, x, y, z and not normalised. `f_dc_*`
-//! are the constant coefficients; `f_rest_*` the others, channel by channel: all of red, then of
-//! green, then of blue. Properties may stand in any order, and any other ones are passed over.
+//! Scales are logarithms, opacities logits, quaternions w, x, y, z and not normalised. `f_dc_*` are the constant
+//! coefficients; `f_rest_*` the others, channel by channel: all of red, then of green, then of blue. Properties may be
+//! in any order, and unknown ones are ignored.
 
 use super::table::{Column, Table};
 use crate::error::{Fault, Place, Reason};
@@ -19,10 +19,10 @@ const REQUIRED: [&str; 13] = [
     "f_dc_1", "f_dc_2",
 ];
 
-/// The property that comes after those, but in files of 2DGS.
+/// The property that follows those, except in files of 2DGS.
 const THIRD_SCALE: &str = "scale_2";
 
-/// The most columns of a Gaussian: those and 24 other coefficients.
+/// The most columns of a Gaussian: those, the third scale, and 24 other coefficients of three channels.
 const MAX_COLUMNS: usize = REQUIRED.len() + 1 + 3 * 24;
 
 /// Reads the scene.
@@ -58,7 +58,7 @@ pub(super) fn load(mut table: Table<'_, '_>) -> Result<Scene, Fault> {
     Ok(scene)
 }
 
-/// The position and the shape of a row's `values`, whose colour goes to `sh`.
+/// Decodes a row's `values`. Returns its position and shape, and writes its colour to `sh`.
 fn gaussian(values: &[f64], flat: bool, sh: &mut [[f32; 3]]) -> ([f32; 3], GaussianShape) {
     let (required, rest) = values.split_at(REQUIRED.len());
     let (third, rest) = rest.split_at(usize::from(!flat));
@@ -84,7 +84,7 @@ pub(super) fn unpack_rest(rest: &[f64], sh: &mut [[f32; 3]]) {
     }
 }
 
-/// The degree that `element` stores and its columns `f_rest_0`, `f_rest_1`, ...
+/// The degree of `element`, and its columns `f_rest_0`, `f_rest_1`, ...
 pub(super) fn rest_columns(
     table: &Table<'_, '_>,
     element: &str,
@@ -96,7 +96,7 @@ pub(super) fn rest_columns(
             .filter(|name| name.starts_with("f_rest_"))
             .count()
     });
-    // A gap in the numbering shows as a missing property.
+    // A gap in the numbering is reported as a missing property.
     let columns = (0..count)
         .map(|i| table.column(element, &format!("f_rest_{i}")))
         .collect::<Result<Vec<_>, _>>()?;

@@ -9,7 +9,7 @@ use super::input::{Format, Input};
 use crate::error::Fault;
 use crate::scene::Scene;
 
-/// The format. Which layout it is, the header's elements tell.
+/// The format. The header's elements tell the layout.
 pub(in crate::formats) struct Ply;
 
 impl Format for Ply {
@@ -34,7 +34,7 @@ impl Format for Ply {
             inria::load(table)?
         };
         let metadata = scene.metadata_mut();
-        // A record without a third scale is evidence, and a comment a claim.
+        // The absence of a third scale is more reliable than a comment.
         metadata.geometry = metadata.geometry.or(said.geometry);
         metadata.antialiasing = said.antialiasing;
         for note in said.notes {

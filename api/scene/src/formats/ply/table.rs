@@ -1,8 +1,8 @@
-//! A PLY file as a row of tables: named elements with named columns of numbers.
+//! A PLY file as a sequence of tables: named elements with named columns of numbers.
 //!
-//! The header is `ply-rs-bw`'s to parse. The payload is read here, because that library hands
-//! over every single number with its property's name: the 62 name look-ups per Gaussian cost
-//! several times as much as everything else, and its text grammar knows neither `nan` nor `inf`.
+//! The crate `ply-rs-bw` parses the header. This module reads the payload, because the crate returns every number with
+//! its property's name: the 62 name look-ups per Gaussian cost several times as much as everything else, and its text
+//! grammar accepts neither `nan` nor `inf`.
 
 use std::io::Cursor;
 
@@ -18,7 +18,7 @@ const MAX_HEADER: usize = 1 << 20;
 /// The longest line of a text payload that is read, in bytes.
 const MAX_LINE: u64 = 1 << 16;
 
-/// Bytes read at once from a binary payload, about: enough for several threads to share.
+/// The approximate number of bytes read at once from a binary payload: enough for several threads to share.
 const BLOCK: usize = 1 << 23;
 
 /// An opened PLY file, whose elements are read in the order of the file.
@@ -27,13 +27,13 @@ pub(super) struct Table<'i, 'a> {
     header: Header,
     /// The header's comments, without the keyword, in the order of the file.
     comments: Vec<String>,
-    /// The index of the element that comes next.
+    /// The index of the next element.
     next: usize,
-    /// Lines consumed, in a text file.
+    /// The lines read so far, in a text file.
     lines: u64,
 }
 
-/// Which column of an element, and the type of its numbers.
+/// A column of an element: its position in a row and the type of its numbers.
 #[derive(Clone)]
 pub(super) struct Column {
     index: usize,
@@ -42,7 +42,7 @@ pub(super) struct Column {
 }
 
 impl<'i, 'a> Table<'i, 'a> {
-    /// Reads the header and checks that the file can hold what it claims.
+    /// Reads the header and checks that the file is large enough for it.
     pub(super) fn open(input: &'i mut Input<'a>) -> Result<Self, Fault> {
         let text = header_text(input)?;
         let header = Parser::<DefaultElement>::new()
@@ -88,8 +88,8 @@ impl<'i, 'a> Table<'i, 'a> {
         self.header.elements.get(name)
     }
 
-    /// The number of rows of element `name`, which the rest of the file is long enough to hold
-    /// together with everything before it.
+    /// The number of rows of element `name`. An error if the rest of the file is too short for it and everything before
+    /// it.
     pub(super) fn count(&self, name: &str) -> Result<usize, Fault> {
         let element = || Place::Element(name.to_owned());
         let index = self
@@ -142,14 +142,14 @@ impl<'i, 'a> Table<'i, 'a> {
                 }
                 PropertyType::List(..) if wanted => return Err(Reason::List.at(place())),
                 PropertyType::Scalar(kind) => offset += size(kind),
-                // `read` refuses the element; until then the offset doesn't matter.
+                // `read` refuses this element; until then the offset doesn't matter.
                 PropertyType::List(..) => {}
             }
         }
         Err(Reason::Missing.at(place()))
     }
 
-    /// The same, of type `kind`.
+    /// Column `property` of element `element`, which must have type `kind`.
     pub(super) fn column_of(
         &self,
         element: &str,
@@ -168,8 +168,8 @@ impl<'i, 'a> Table<'i, 'a> {
         }))
     }
 
-    /// Reads element `name`: calls `each` with a row's index and its values of `columns`. Elements before it are passed
-    /// over; those before the last element read are gone.
+    /// Reads element `name`: calls `each` with a row's index and its values of `columns`. Elements before it are
+    /// skipped; those before the last element read can't be read any more.
     pub(super) fn read(
         &mut self,
         name: &str,
@@ -187,7 +187,7 @@ impl<'i, 'a> Table<'i, 'a> {
         })
     }
 
-    /// The same, many rows at once.
+    /// Reads element `name`, with many rows for each call.
     pub(super) fn read_blocks(
         &mut self,
         name: &str,
@@ -298,13 +298,13 @@ impl<'i, 'a> Table<'i, 'a> {
 
 /// Rows of an element that were read at once.
 pub(super) struct Rows<'a> {
-    /// Their number.
+    /// The number of rows.
     pub(super) count: usize,
     columns: &'a [Column],
     source: Source<'a>,
 }
 
-/// What rows are made of.
+/// The data of rows.
 enum Source<'a> {
     Binary {
         bytes: &'a [u8],
@@ -316,7 +316,8 @@ enum Source<'a> {
 }
 
 impl Rows<'_> {
-    /// Puts the values of row `row`, one for each column, into `values`. A binary64 holds every type's values exactly.
+    /// Writes the values of row `row`, one for each column, to `values`. A binary64 holds the values of every type
+    /// exactly.
     pub(super) fn get(&self, row: usize, values: &mut [f64]) {
         match self.source {
             Source::Binary {
@@ -359,7 +360,7 @@ fn header_text(input: &mut Input<'_>) -> Result<Vec<u8>, Fault> {
     }
 }
 
-/// The library's messages go on with the line's text and the parser's state.
+/// The first sentence of a message of the library, without the line's text and the parser's state that follow.
 fn first_sentence(message: &str) -> String {
     let message = message.lines().next().unwrap_or_default();
     let message = message
@@ -369,7 +370,7 @@ fn first_sentence(message: &str) -> String {
     message.trim_end_matches('.').to_owned()
 }
 
-/// The size of a row in bytes; an element with lists has none.
+/// The size of a row in bytes. An error for an element with lists.
 fn stride(element: &ElementDef) -> Result<usize, Fault> {
     element
         .properties
@@ -416,7 +417,7 @@ fn number<const BIG_ENDIAN: bool>(column: &Column, row: &[u8]) -> f64 {
     }
 }
 
-/// The value of `word` as a number of type `kind`; `nan` and `inf` are numbers here.
+/// The value of `word` as a number of type `kind`; `nan` and `inf` are allowed.
 fn text_number(kind: &ScalarType, word: &str) -> Option<f64> {
     match kind {
         ScalarType::Float => word.parse::<f32>().ok().map(f64::from),

@@ -1,10 +1,10 @@
-//! What the pixels of a SOG scene's images mean.
+//! Decodes the images of a SOG scene to attributes of Gaussians.
 //!
-//! Positions are 16 bits between bounds, low and high bytes in an image each, of a logarithm that keeps signs.
-//! Quaternions are their three smallest components, and alpha has the index of the largest. Version 2 has codebooks of
-//! 256 values for scales (logarithms), colours and other coefficients, and opacities as bytes; version 1 has bounds of
-//! all of them, and opacities are logits. Other coefficients are of a palette: one image has its entries, 64 in a row,
-//! and another one the entry of each Gaussian.
+//! Positions are 16 bits between bounds, with low and high bytes in an image each, of a logarithm that keeps signs.
+//! Quaternions are their three smallest components; alpha has the index of the largest. Version 2 has codebooks of 256
+//! values for scales (logarithms), colours and other coefficients, and opacities as bytes; version 1 has bounds for all
+//! of them, and opacities are logits. Other coefficients come from a palette: one image has its entries, 64 in a row,
+//! and another one the entry's index for each Gaussian.
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
@@ -18,10 +18,10 @@ use crate::metadata::{Antialiasing, Geometry, Metadata};
 use crate::scene::Scene;
 use crate::shape::{GaussianShape, sigmoid};
 
-/// Entries of a codebook.
+/// The number of entries of a codebook.
 const CODEBOOK: usize = 256;
 
-/// Entries of the palette in one row of its image.
+/// The entries of the palette in one row of its image.
 const PALETTE_ROW: usize = 64;
 
 /// The most Gaussians in a scene: pixels of the largest image that WebP has.
@@ -40,7 +40,7 @@ struct Meta {
     sh_rest: Option<Attribute>,
 }
 
-/// Images of an attribute, and how their bytes become numbers.
+/// An attribute: its images, and the bounds or codebook that decode their bytes.
 #[derive(Deserialize)]
 struct Attribute {
     files: Vec<String>,
@@ -48,7 +48,7 @@ struct Attribute {
     mins: Numbers,
     #[serde(default)]
     maxs: Numbers,
-    /// The first entry may be null, by a mistake of an early writer.
+    /// The codebook. Its first entry may be null, because of a mistake of an early writer.
     #[serde(default)]
     codebook: Vec<Option<f64>>,
     shape: Option<Vec<f64>>,
@@ -66,7 +66,7 @@ enum Numbers {
     Many(Vec<f64>),
 }
 
-/// A whole number from `range`, as JSON has it.
+/// `value` as an integer from 0 to `last`; None if it is not one.
 fn whole(value: f64, last: u64) -> Option<u64> {
     (value.fract() == 0.0 && (0.0..=last as f64).contains(&value)).then_some(value as u64)
 }
@@ -76,7 +76,7 @@ fn fault(name: &str, field: &str, reason: Reason) -> Fault {
 }
 
 impl Attribute {
-    /// Image `index` of this attribute `name`, of `expected` entries.
+    /// Image `index` of the attribute `name`, which must have `expected` entries.
     fn image(
         &self,
         name: &str,
@@ -91,7 +91,7 @@ impl Attribute {
         files.image(file, expected)
     }
 
-    /// Minima and maxima of `N` components.
+    /// The minima and maxima of `N` components.
     fn bounds<const N: usize>(&self, name: &str) -> Result<[[f64; 2]; N], Fault> {
         let numbers = |numbers: &Numbers, field: &str| match numbers {
             Numbers::Many(values) if values.len() >= N => Ok(std::array::from_fn(|i| values[i])),
@@ -105,7 +105,7 @@ impl Attribute {
         Ok(std::array::from_fn(|i| [mins[i], maxs[i]]))
     }
 
-    /// The values of bytes.
+    /// The values of the 256 bytes.
     fn codebook(&self, name: &str) -> Result<[f64; CODEBOOK], Fault> {
         let field = "codebook";
         if self.codebook.len() != CODEBOOK {
@@ -129,7 +129,7 @@ fn count(name: &str, field: &str, found: usize, expected: usize) -> Fault {
 /// The values of a byte in each component of an attribute.
 type Values<const N: usize> = [[f64; 256]; N];
 
-/// Values evenly between bounds.
+/// Values spaced evenly between bounds.
 fn linear<const N: usize>(bounds: [[f64; 2]; N]) -> Values<N> {
     bounds.map(|[min, max]| std::array::from_fn(|byte| min + (max - min) * (byte as f64 / 255.0)))
 }
@@ -248,7 +248,7 @@ fn unsigned_log(value: f64) -> f64 {
     (value.abs().exp() - 1.0).copysign(value)
 }
 
-/// The quaternion w, x, y, z of a texel, if its alpha is 252 and more: which component is the largest.
+/// Decodes a quaternion w, x, y, z. Alpha minus 252 is the index of the largest component; None if alpha is smaller.
 fn quaternion([a, b, c, tag]: [u8; 4]) -> Option<[f32; 4]> {
     let largest = usize::from(tag.checked_sub(252)?);
     let small = [a, b, c].map(|byte| (f64::from(byte) / 255.0 * 2.0 - 1.0) * FRAC_1_SQRT_2);
@@ -263,7 +263,7 @@ fn quaternion([a, b, c, tag]: [u8; 4]) -> Option<[f32; 4]> {
 }
 
 impl Palette {
-    /// The palette of the attribute `rest`; none if it has no bands.
+    /// Reads the palette of the attribute `rest`; None if it has no bands.
     fn read(
         rest: &Attribute,
         legacy: bool,
@@ -277,7 +277,7 @@ impl Palette {
         } else {
             rest.codebook(name)?
         };
-        // Version 1 has neither a number of bands nor one of entries: the image's width tells.
+        // Version 1 gives neither the number of bands nor that of entries: the image's width tells the bands.
         let (degree, len) = if legacy {
             (None, 0)
         } else {
@@ -319,13 +319,13 @@ impl Palette {
         }))
     }
 
-    /// The entry of Gaussian `index`, which may be none.
+    /// The index of Gaussian `index`'s palette entry, which may be out of range.
     fn label(&self, index: usize) -> usize {
         let [low, high, ..] = self.labels.texel(index);
         u16::from_le_bytes([low, high]).into()
     }
 
-    /// Fills the coefficients of Gaussian `index` from degree 1 on.
+    /// Writes the coefficients of Gaussian `index` from degree 1 on.
     fn fill(&self, index: usize, sh: &mut [[f32; 3]]) {
         let label = self.label(index);
         if label >= self.len {

@@ -1,4 +1,4 @@
-//! Where the files of a SOG scene are: entries of a zip archive, or a folder.
+//! Access to the files of a SOG scene: entries of a zip archive, or files of a folder.
 
 use std::collections::HashMap;
 
@@ -12,13 +12,13 @@ use crate::formats::spz::one_line;
 
 /// The files of a scene.
 pub(super) enum Files<'a> {
-    /// In a zip archive.
+    /// The entries of a zip archive.
     Archive(Archive<'a>),
-    /// In this folder below the one of the input.
+    /// The files of this folder, which is below that of the input.
     Folder(Origin<'a>, String),
 }
 
-/// A zip archive and where its entries are.
+/// A zip archive and the positions of its entries.
 pub(super) struct Archive<'a> {
     archive: ZipSliceArchive<&'a [u8]>,
     entries: HashMap<Vec<u8>, Entry>,
@@ -56,7 +56,7 @@ impl Image {
 }
 
 impl<'a> Files<'a> {
-    /// The files of the zip archive `bytes`.
+    /// The files in the zip archive `bytes`.
     pub(super) fn archive(bytes: &'a [u8]) -> Result<Self, Fault> {
         let damaged = |error: rawzip::Error| Reason::Zip(one_line(&error)).at(Place::File);
         let archive = ZipArchive::from_slice(bytes).map_err(damaged)?;
@@ -74,7 +74,7 @@ impl<'a> Files<'a> {
         Ok(Self::Archive(Archive { archive, entries }))
     }
 
-    /// The files in `folder`, which is below the one of `origin`.
+    /// The files in `folder`, which is below that of `origin`.
     pub(super) fn folder(origin: Origin<'a>, folder: &str) -> Self {
         Self::Folder(origin, folder.to_owned())
     }
@@ -89,14 +89,14 @@ impl<'a> Files<'a> {
         }
     }
 
-    /// Reads the image `name`, in which `expected` entries are a pixel each.
+    /// Reads the image `name`, in which each of `expected` entries is a pixel.
     pub(super) fn image(&self, name: &str, expected: u64) -> Result<Image, Fault> {
         let bytes = self.read(name)?;
         image(&bytes, expected).map_err(|reason| reason.at(Place::Entry(name.to_owned())))
     }
 }
 
-/// `name` in `folder`.
+/// The path of `name` in `folder`.
 pub(super) fn join(folder: &str, name: &str) -> String {
     if folder.is_empty() {
         name.to_owned()
@@ -120,7 +120,7 @@ impl Archive<'_> {
         if claimed > available {
             return Err(Reason::TooShort { claimed, available });
         }
-        // The reader checks the size and the sum.
+        // The reader checks the size and the checksum.
         let bytes = match entry.method {
             CompressionMethod::STORE => {
                 read_growing(stored.verifying_reader(stored.data()), claimed + 1, 0)
@@ -147,7 +147,7 @@ fn image(bytes: &[u8], expected: u64) -> Result<Image, Reason> {
     let mut decoder = WebPDecoder::new(std::io::Cursor::new(bytes)).map_err(damaged)?;
     let (width, height) = decoder.dimensions();
     let pixels = u64::from(width) * u64::from(height);
-    // Writers round sides up; a few bytes may claim a whole gigabyte.
+    // Writers round sides up. A few bytes may claim an image of a gigabyte.
     if pixels < expected || pixels > 4 * expected + (1 << 20) {
         return Err(Reason::Pixels {
             width,

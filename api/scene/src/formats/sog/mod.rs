@@ -1,7 +1,8 @@
 //! PlayCanvas's SOG, versions 1 and 2: a JSON document and WebP images, in which a pixel is a Gaussian.
 //!
-//! The document, `meta.json`, lies with its images in a zip archive (`.sog`) or in a folder. A streamed scene has a
-//! document `lod-meta.json` that names such documents, of several levels of detail. The frame is that of PLY files.
+//! The document, `meta.json`, is with its images in a zip archive (`.sog`) or in a folder. A streamed scene has a
+//! document `lod-meta.json` that names several such documents, of different levels of detail. The frame is that of PLY
+//! files.
 
 mod attributes;
 mod document;
@@ -44,7 +45,7 @@ impl Format for Sog {
     }
 }
 
-/// The format as a document beside its images, or a streamed scene's.
+/// The format as a document in a folder with its images, or a streamed scene's document.
 pub(super) struct SogFolder;
 
 impl Format for SogFolder {
@@ -58,7 +59,7 @@ impl Format for SogFolder {
 
     fn load(&self, input: &mut Input<'_>) -> Result<Scene, Fault> {
         let meta = input.up_to(MAX_META)?;
-        /// What tells the two documents apart.
+        /// The field that distinguishes the two documents.
         #[derive(Deserialize)]
         struct Kind {
             tree: Option<serde::de::IgnoredAny>,

@@ -91,7 +91,7 @@ pub(super) fn load(meta: &[u8], origin: Origin<'_>) -> Result<Scene, Fault> {
     Ok(scene)
 }
 
-/// Collects what `node` and those below it have at `level`, by file.
+/// Collects the parts of `node` and its descendants at `level`, by file.
 fn collect(node: &Node, level: &str, parts: &mut BTreeMap<usize, Vec<Part>>) {
     if let Some(part) = node.lods.get(level) {
         parts.entry(part.file).or_default().push(*part);
@@ -112,7 +112,7 @@ fn unit(name: &str, origin: Origin<'_>) -> Result<Scene, Fault> {
         let folder = name.rsplit_once('/').map_or("", |(folder, _)| folder);
         attributes::load(&bytes, &Files::folder(origin, folder))
     };
-    // A place in it is one of that file.
+    // The place of the fault is in the named file.
     read().map_err(|fault| match fault.place {
         Place::Part(place) => fault.reason.at(Place::Part(format!("{name:?}, {place}"))),
         Place::Entry(entry) if !entry.contains('/') => {
