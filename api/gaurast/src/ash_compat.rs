@@ -1,10 +1,10 @@
-//! All that depends on ash's version: how an enum, a flags type and a structure in a `pNext` chain
-//! are declared, and how function pointers are loaded. A change of ash's shape is made here.
+//! All code that depends on ash's version: the declarations of enums, flags types and structures in a `pNext` chain,
+//! and the loading of function pointers. Only this module adapts to another version.
 
 use core::ffi::{CStr, c_void};
 
-/// Declares a Vulkan enum as ash does: a transparent `i32`, a constant per value, and a `Debug`
-/// that prints the value's name, or its number where it has none.
+/// Declares a Vulkan enum as ash does: a transparent `i32`, a constant per value, and a `Debug` that prints the value's
+/// name, or its number if it has none.
 macro_rules! vk_enum {
     (
         $(#[$meta:meta])*
@@ -44,7 +44,7 @@ macro_rules! vk_enum {
 pub(crate) use vk_enum;
 
 /// Declares Vulkan flags as ash does: transparent, a constant per bit, set operations, and a `Debug` that prints the
-/// names of the bits that are set, and the number that the bits without a name are.
+/// names of the set bits, and the number formed by the bits without a name.
 macro_rules! vk_flags {
     (
         $(#[$meta:meta])*
@@ -87,7 +87,7 @@ macro_rules! vk_flags {
 }
 pub(crate) use vk_flags;
 
-/// Writes ash's by-value setters, one for each named field.
+/// Defines ash's by-value setters, one for each named field.
 macro_rules! setters {
     ($($field:ident: $type:ty,)*) => {$(
         #[doc = concat!("Sets [`", stringify!($field), "`](Self#structfield.", stringify!($field), ").")]
@@ -100,7 +100,7 @@ macro_rules! setters {
 }
 pub(crate) use setters;
 
-/// Writes the setters of fields that are a `Bool32`, each of which takes a `bool`.
+/// Defines the setters of fields that are a `Bool32`; each takes a `bool`.
 macro_rules! bool_setters {
     ($($field:ident,)*) => {$(
         #[doc = concat!("Sets [`", stringify!($field), "`](Self#structfield.", stringify!($field), ").")]
@@ -113,8 +113,8 @@ macro_rules! bool_setters {
 }
 pub(crate) use bool_setters;
 
-/// Makes a `repr(C)` structure that starts with `s_type` and `p_next` one that ash can chain: gives
-/// it its structure type, the structures that it extends, and the thread safety of ash's own.
+/// Makes a `repr(C)` structure that starts with `s_type` and `p_next` chainable with ash: gives it its structure type,
+/// the structures that it extends, and the thread safety of ash's own.
 macro_rules! tagged_structure {
     ($name:ident = $s_type:expr $(, $extends:ident)*) => {
         // SAFETY: the structure is `repr(C)` and starts with `s_type` and `p_next`, as

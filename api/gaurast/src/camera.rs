@@ -1,5 +1,5 @@
-//! Helpers that build a [`GaussianCameraGAURAST`] from what applications have: view and projection
-//! matrices, or a pose and intrinsics.
+//! Helpers that build a [`GaussianCameraGAURAST`] from an application's camera: view and projection matrices, or a pose
+//! and intrinsics.
 //!
 //! Everything is computed in binary64 and rounded once. Matrices are column-major (`m[column][row]`,
 //! as `glam`'s `to_cols_array_2d` and GLSL have them) and act on column vectors; projections map
@@ -9,15 +9,14 @@ use core::fmt;
 
 use crate::vk::{GaussianCameraDataGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST};
 
-/// How far a matrix may be from the form that a helper asks for: room for matrices composed in
-/// binary32, none for anything that would show.
+/// The tolerance for the form of a matrix. It allows for matrices composed in binary32, but for no visible difference.
 const TOLERANCE: f64 = 1e-4;
 
-/// Why a camera cannot be built.
+/// The reason that a camera can't be built.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum CameraError {
-    /// An input, or the camera that follows from it, is infinite or not a number.
+    /// An input, or the resulting camera, has a number that is infinite or not a number.
     NotFinite,
     /// The view matrix or the pose is not a rotation (or reflection) with a translation: it scales,
     /// shears, projects or is singular.
@@ -25,7 +24,7 @@ pub enum CameraError {
     /// The projection matrix is neither a perspective nor an orthographic one along the view axis,
     /// or it is singular: it has a skew, an oblique near plane, or maps every depth to one.
     UnsupportedProjection,
-    /// The projection looks the other way along the view's z axis than the constructor says.
+    /// The projection looks in the opposite direction along the view's z axis from that of the constructor.
     OppositeDirection,
     /// The viewport has no area.
     EmptyViewport,
@@ -69,15 +68,13 @@ impl From<&GaussianCameraGAURAST<'_>> for GaussianCameraDataGAURAST {
 }
 
 impl GaussianCameraGAURAST<'_> {
-    /// The camera of a right-handed view matrix, which looks along -z with +y up (OpenGL's
-    /// convention), and a projection matrix for it, such as those of
-    /// `glam::camera::rh::proj::vulkan`.
+    /// The camera of a right-handed view matrix, which looks along -z with +y up (OpenGL's convention), and a
+    /// projection matrix for it, such as those of `glam::camera::rh::proj::vulkan`.
     ///
-    /// `view` is world to camera. `viewport` is the Vulkan viewport's width and height in pixels; a
-    /// negative height turns the picture over, as in Vulkan. The projection may be off-centre, have
-    /// either sign of y (so one made for another API gives an upside-down picture, exactly as it
-    /// does for triangles), reverse depth, or have an infinite far plane. Its depths 0
-    /// and 1 become the camera's near and far plane.
+    /// `view` is world to camera. `viewport` is the Vulkan viewport's width and height in pixels; a negative height
+    /// flips the picture, as in Vulkan. The projection may be off-centre, have either sign of y (so one made for
+    /// another API gives an upside-down picture, exactly as it does for triangles), reverse depth, or have an infinite
+    /// far plane. Its depths 0 and 1 become the camera's near and far plane.
     ///
     /// # Errors
     ///
@@ -103,7 +100,7 @@ impl GaussianCameraGAURAST<'_> {
         from_matrices(view, projection, viewport, 1.0)
     }
 
-    /// The pinhole camera of a pose and intrinsics, as the `cameras.json` of 3DGS has them.
+    /// The pinhole camera of a pose and intrinsics, as in the `cameras.json` of 3DGS.
     ///
     /// `camera_to_world` holds the *rows* of the rotation from camera axes (+x right, +y down,
     /// +z forward) to world axes, so that its columns are those directions in world space; `eye` is
@@ -141,8 +138,8 @@ impl GaussianCameraGAURAST<'_> {
     }
 
     /// A panorama of all 360 by 180 degrees that fills a viewport of the given width and height in pixels, with the
-    /// direction forward in its middle. Give it twice the width of its height, and as many pixels go to a degree of
-    /// longitude (on the horizon) as to one of latitude.
+    /// direction forward in its middle. If the width is twice the height, a degree of longitude (on the horizon) has as
+    /// many pixels as one of latitude.
     ///
     /// `camera_to_world` and `eye` are as for [`from_pose`](Self::from_pose).
     ///
@@ -196,14 +193,14 @@ impl GaussianCameraGAURAST<'_> {
         self.depth_from_planes(near, far, [1.0, 0.0])
     }
 
-    /// Depth `depths[0]` at `near` and `depths[1]` at `far`.
+    /// The camera with depth `depths[0]` at `near` and `depths[1]` at `far`.
     fn depth_from_planes(self, near: f32, far: f32, depths: [f64; 2]) -> Result<Self, CameraError> {
         let orthographic = self.model == GaussianCameraModelGAURAST::ORTHOGRAPHIC;
         let bounded = near.is_finite() && (far.is_finite() || !orthographic);
         if !(bounded && near < far && (orthographic || near > 0.0)) {
             return Err(CameraError::InvalidDepthRange);
         }
-        // Depth is linear in z or in 1/z; either way a line through two points.
+        // Depth is linear in z or in 1/z, so two points determine it.
         let variable = |z: f32| {
             if orthographic {
                 f64::from(z)
@@ -226,8 +223,8 @@ pub fn widen(matrix: &[[f32; 4]; 4]) -> [[f64; 4]; 4] {
     matrix.map(|column| column.map(f64::from))
 }
 
-/// What a projection matrix is for the extension. Offsets are in normalised device coordinates;
-/// scales are per unit of x/z (perspective) or x (orthographic), with the matrix's signs.
+/// The parameters of a projection matrix. Offsets are in normalised device coordinates; scales are per unit of x/z
+/// (perspective) or x (orthographic), with the matrix's signs.
 struct Projection {
     orthographic: bool,
     scale: [f64; 2],
@@ -260,8 +257,8 @@ fn from_matrices(
     let projection = decompose_projection(projection, forward)?;
     let (near, far) = depth_planes(&projection)?;
 
-    // Focal lengths are positive: the signs of x, y and z move into the rotation. A negative height
-    // turns y over about the same corner.
+    // Focal lengths are positive: the signs of x, y and z are moved to the rotation. A negative height flips y about
+    // the same corner.
     let half_extent = [width / 2.0, height.abs() / 2.0];
     let flip = [1.0, height.signum()];
     let signed_focal = [0, 1].map(|i| half_extent[i] * flip[i] * projection.scale[i]);
@@ -290,7 +287,7 @@ fn from_matrices(
     }
 }
 
-/// Whether rounding to binary32 has left every number finite (the far plane need not be).
+/// True if every number is finite after rounding to binary32. The far plane may be infinite.
 fn fits_binary32(camera: &GaussianCameraGAURAST<'_>) -> bool {
     let pairs = [
         camera.focal_length,
@@ -302,7 +299,7 @@ fn fits_binary32(camera: &GaussianCameraGAURAST<'_>) -> bool {
         && camera.eye.iter().all(|x| x.is_finite())
 }
 
-/// The rows of a view matrix's rotation, and its eye.
+/// The rows of a view matrix's rotation, and the position of its eye.
 fn decompose_view(view: &[[f64; 4]; 4]) -> Result<([[f64; 3]; 3], [f64; 3]), CameraError> {
     let row = |r: usize| [view[0][r], view[1][r], view[2][r]];
     let axes = [row(0), row(1), row(2)];
@@ -310,8 +307,8 @@ fn decompose_view(view: &[[f64; 4]; 4]) -> Result<([[f64; 3]; 3], [f64; 3]), Cam
     if !affine || !is_orthonormal(&axes) {
         return Err(CameraError::NotRigid);
     }
-    // The eye solves axes * eye = -translation. The true inverse, not the transpose, keeps t exact
-    // where the eye is far away and the axes carry rounding errors.
+    // The eye solves axes * eye = -translation. The true inverse, not the transpose, keeps the translation exact if the
+    // eye is far away and the axes have rounding errors.
     let cofactors = [
         cross(axes[1], axes[2]),
         cross(axes[2], axes[0]),
@@ -325,7 +322,7 @@ fn decompose_view(view: &[[f64; 4]; 4]) -> Result<([[f64; 3]; 3], [f64; 3]), Cam
     Ok((axes, eye))
 }
 
-/// Reads a perspective or orthographic matrix that looks along `forward`.
+/// Decomposes a perspective or orthographic matrix that looks along `forward`.
 fn decompose_projection(
     projection: &[[f64; 4]; 4],
     forward: f64,
@@ -348,7 +345,7 @@ fn decompose_projection(
     };
 
     let orthographic = is_zero(w, 2);
-    // x and y are shifted by what w is made of: a constant, or z.
+    // x and y are shifted in proportion to w, which is a constant or z.
     let shift = if orthographic { 3 } else { 2 };
     let supported = only(w, [shift, shift])
         && only(x, [0, shift])
@@ -359,7 +356,7 @@ fn decompose_projection(
     if !supported {
         return Err(CameraError::UnsupportedProjection);
     }
-    // w is `divisor` times 1 or the distance ahead, which must come out positive.
+    // w is `divisor` times 1 or times the distance ahead; it must be positive.
     let direction = if orthographic { 1.0 } else { forward };
     let divisor = direction * w[shift];
     if divisor < 0.0 {
@@ -368,7 +365,7 @@ fn decompose_projection(
     if divisor == 0.0 {
         return Err(CameraError::UnsupportedProjection);
     }
-    // Depth from the view's z and a constant; z is `forward` times the distance ahead.
+    // The coefficients of depth for the view's z and for a constant; z is `forward` times the distance ahead.
     let depth_coefficients = if orthographic {
         [z[3] / divisor, forward * z[2] / divisor]
     } else {
@@ -388,14 +385,14 @@ fn decompose_projection(
     })
 }
 
-/// The nearest and the farthest distance ahead whose depth lies in 0..1.
+/// The nearest and the farthest distance ahead at which depth is within 0..1.
 fn depth_planes(projection: &Projection) -> Result<(f32, f32), CameraError> {
     let [c0, c1] = projection.depth_coefficients;
     let distance_at = |depth: f64| {
         if projection.orthographic {
             return (depth - c0) / c1;
         }
-        // A depth that is only reached behind the camera, or not at all, is never reached ahead.
+        // A depth that is reached only behind the camera, or not at all, is never reached ahead.
         let distance = c1 / (depth - c0);
         if distance > 0.0 {
             distance
@@ -412,7 +409,7 @@ fn depth_planes(projection: &Projection) -> Result<(f32, f32), CameraError> {
     }
 }
 
-/// Whether the rows are orthonormal, within [`TOLERANCE`].
+/// True if the rows are orthonormal, within [`TOLERANCE`].
 fn is_orthonormal(rows: &[[f64; 3]; 3]) -> bool {
     (0..3).all(|i| {
         (0..3).all(|j| {
@@ -426,7 +423,7 @@ fn transpose(rows: &[[f64; 3]; 3]) -> [[f64; 3]; 3] {
     [0, 1, 2].map(|i| [rows[0][i], rows[1][i], rows[2][i]])
 }
 
-/// Row-major elements, rounded.
+/// The elements in row-major order, rounded to binary32.
 fn flatten(rows: &[[f64; 3]; 3]) -> [f32; 9] {
     core::array::from_fn(|i| rows[i / 3][i % 3] as f32)
 }

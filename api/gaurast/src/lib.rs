@@ -1,6 +1,5 @@
-//! `VK_GAURAST_gaussian_primitive_topology` for [`ash`], in the shape in which ash ships the
-//! extensions that it knows: a module with the extension's [`NAME`] and [`Device`] functions, and
-//! the structures, enums and constants in [`vk`].
+//! `VK_GAURAST_gaussian_primitive_topology` for [`ash`], in the form of the extensions that ash contains: a module with
+//! the extension's [`NAME`] and [`Device`] functions, and the structures, enums and constants in [`vk`].
 //!
 //! ```no_run
 //! # fn example(

@@ -1,15 +1,14 @@
-//! Files that appear whole or not at all.
+//! Atomic writes: a file appears with all its contents, or is not changed.
 
 use std::io::{self, Write};
 use std::path::Path;
 
 use tempfile::NamedTempFile;
 
-/// Makes `bytes` the contents of the file `path`: the file that was there is replaced when everything has been written,
-/// and stays as it is if something fails. What is no ordinary file, such as a pipe or a device, is written to instead.
+/// Writes `bytes` to the file `path`. The file that was there is replaced when everything has been written, and is
+/// unchanged if something fails. A path that is not a regular file, such as a pipe or a device, is written to directly.
 ///
-/// # Errors
-/// What the system says.
+/// # Errors Returns the system's error.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> io::Result<()> {
     if path.metadata().is_ok_and(|there| !there.is_file()) {
         return std::fs::write(path, bytes);
@@ -33,7 +32,7 @@ pub fn folder(path: &Path) -> &Path {
 fn builder() -> tempfile::Builder<'static, 'static> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(".gaurast-");
-    // Readable like any other new file; the crate's own default is for secrets.
+    // Permissions of an ordinary new file; the crate's default is private.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     builder
@@ -44,7 +43,7 @@ fn persist(file: NamedTempFile, path: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// Files that have no name until they are written, so that a process which is interrupted leaves none behind.
+/// Files without a name until they are written, so that an interrupted process leaves none behind.
 #[cfg(target_os = "linux")]
 mod unnamed {
     use super::{builder, folder};
@@ -54,7 +53,7 @@ mod unnamed {
     use std::os::fd::AsRawFd;
     use std::path::Path;
 
-    /// As [`super::write_atomically`]; nothing if the file system has no such files.
+    /// Replaces like [`super::write_atomically`]. None if the file system has no unnamed files.
     pub(super) fn replace(path: &Path, bytes: &[u8]) -> Option<io::Result<()>> {
         let flags = OFlags::WRONLY | OFlags::TMPFILE | OFlags::CLOEXEC;
         let file = openat(CWD, folder(path), flags, Mode::from_raw_mode(0o666)).ok()?;
@@ -63,7 +62,7 @@ mod unnamed {
             return Some(Err(error));
         }
         let written = format!("/proc/self/fd/{}", file.as_raw_fd());
-        // It needs a name of its own first: a link replaces nothing.
+        // It gets a name of its own first, because a link can't replace a file.
         let named = builder().make_in(folder(path), |name| {
             Ok(linkat(CWD, &written, CWD, name, AtFlags::SYMLINK_FOLLOW)?)
         });

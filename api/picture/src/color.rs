@@ -1,18 +1,18 @@
-//! Colours behind pictures, as people write them.
+//! Backgrounds of pictures, and their names.
 
 use std::str::FromStr;
 
-/// What is behind a picture.
+/// The background of a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Background {
-    /// An opaque colour: red, green and blue, each 0 to 1, as they are shown.
+    /// An opaque colour: red, green and blue, each 0 to 1, with the sRGB transfer function.
     Color([f32; 3]),
-    /// Nothing: the picture stays transparent.
+    /// No background: the picture stays transparent.
     Transparent,
 }
 
 impl Background {
-    /// The colour that shows through; black where there is nothing.
+    /// The background's colour; black if transparent.
     pub fn color(self) -> [f32; 3] {
         match self {
             Self::Color(color) => color,
@@ -21,7 +21,7 @@ impl Background {
     }
 }
 
-/// The colours that have names: CSS's basic ones.
+/// The named colours: CSS's basic ones.
 const NAMES: [(&str, [u8; 3]); 17] = [
     ("black", [0, 0, 0]),
     ("silver", [192, 192, 192]),
@@ -45,7 +45,7 @@ const NAMES: [(&str, [u8; 3]); 17] = [
 impl FromStr for Background {
     type Err = &'static str;
 
-    /// Reads `transparent`, a name, `#rgb`, `#rrggbb`, or three finite numbers with commas between them.
+    /// Parses `transparent`, a name, `#rgb`, `#rrggbb`, or three finite numbers with commas between them.
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let lower = text.trim().to_ascii_lowercase();
         if lower == "transparent" {

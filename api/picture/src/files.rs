@@ -1,10 +1,9 @@
 //! Pictures as files.
 //!
-//! A rendered pixel is (C, 1 - T): accumulated colour, already weighted by alpha, and alpha. EXR
-//! files hold exactly that in 32-bit floats, with depths as further channels where there are some.
-//! The others have eight bits and are opaque, over the background, which is black by default. PNG
-//! and WebP may be transparent instead: their alpha is not premultiplied, so colours are divided by
-//! alpha before they are rounded.
+//! A rendered pixel is (C, 1 - T): accumulated colour, already weighted by alpha, and alpha. EXR files store it
+//! unchanged in 32-bit floats, with depths as further channels if there are any. The other formats have eight bits and
+//! are opaque, over the background, which is black by default. PNG and WebP may be transparent instead: their alpha is
+//! not premultiplied, so colours are divided by alpha before they are rounded.
 
 use std::io::{self, Cursor};
 use std::path::{Path, PathBuf};
@@ -20,7 +19,7 @@ use crate::atomic::{folder, write_atomically};
 use crate::color::Background;
 use crate::picture::Picture;
 
-/// The quality of JPEG files where none is given, 1 to 100.
+/// The default quality of JPEG files, 1 to 100.
 pub const DEFAULT_QUALITY: u8 = 90;
 
 /// The greatest side of a JPEG file's picture.
@@ -32,11 +31,11 @@ const MAX_WEBP_SIDE: u32 = 16_384;
 /// A format of picture files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PictureFormat {
-    /// 8-bit RGB, or RGBA where the background is transparent.
+    /// 8-bit RGB, or RGBA if the background is transparent.
     Png,
-    /// 8-bit RGB with losses.
+    /// 8-bit RGB, lossy.
     Jpeg,
-    /// 8-bit RGB or RGBA without losses.
+    /// 8-bit RGB or RGBA, lossless.
     WebP,
     /// 32-bit float RGBA, and depths.
     Exr,
@@ -44,10 +43,10 @@ pub enum PictureFormat {
     Ppm,
 }
 
-/// Why a picture could not be written.
+/// The reason that a picture could not be written or read.
 #[derive(Debug, Error)]
 pub enum OutputError {
-    /// The extension is of no format that is written.
+    /// No supported format has the extension.
     #[error("{}: pictures are written as {EXTENSIONS}", path.display())]
     UnknownFormat {
         /// The file.
@@ -58,7 +57,7 @@ pub enum OutputError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The system's error.
         source: io::Error,
     },
     /// The picture doesn't fit the format.
@@ -93,48 +92,48 @@ impl PictureFormat {
         }
     }
 
-    /// Tells if files of this format can be transparent.
+    /// Reports whether files of this format can be transparent.
     pub fn has_alpha(self) -> bool {
         !matches!(self, Self::Jpeg | Self::Ppm)
     }
 
-    /// Bytes of memory for each pixel that encoding takes beside the picture, at most.
+    /// The most bytes for each pixel that encoding allocates, apart from the picture.
     pub fn bytes_per_pixel(self) -> u64 {
         match self {
             Self::Png | Self::Jpeg | Self::WebP | Self::Ppm => 8,
-            // The channels twice: planes, then the file.
+            // The channels twice: as planes, then as the file.
             Self::Exr => 48,
         }
     }
 }
 
-/// How a picture becomes a file.
+/// The options of encoding a picture.
 #[derive(Clone, Copy, Debug)]
 pub struct Encoding<'a> {
-    /// What is behind the picture; black, or nothing in an EXR file, where there is none.
+    /// The background. Without one, EXR files are transparent and others have a black background.
     pub background: Option<Background>,
     /// The expected and the median depth of each pixel, for EXR files.
     pub depth: Option<&'a [[f32; 2]]>,
     /// The quality of JPEG files, 1 to 100.
     pub quality: u8,
-    /// EXR files hold linear light: colours, which are sRGB as they are trained, are turned into that.
+    /// True for EXR files in linear light: colours, which are trained as sRGB, are converted.
     pub linear: bool,
-    /// What the picture's colours are.
+    /// The colour space of the picture.
     pub colors: Colors,
 }
 
-/// What the colours of a picture are.
+/// The colour space of a picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Colors {
-    /// sRGB, as they are shown: what 3DGS is trained on.
+    /// sRGB: the colours of 3DGS's training.
     #[default]
     Srgb,
-    /// Linear light, which files of eight bits hold as sRGB.
+    /// Linear light, which is converted to sRGB for files of eight bits.
     Linear,
 }
 
 impl Colors {
-    /// A background, which is given as it is shown, as these colours have it.
+    /// The background, whose colour is sRGB, in this colour space; black without a background.
     fn behind(self, background: Option<Background>) -> [f32; 3] {
         let shown = background.map_or([0.0; 3], Background::color);
         match self {
@@ -143,7 +142,7 @@ impl Colors {
         }
     }
 
-    /// A colour, not premultiplied, as it is shown.
+    /// A colour, not premultiplied, converted from this colour space to sRGB.
     fn shown(self, colour: f32) -> f32 {
         match self {
             Self::Srgb => colour,
@@ -165,8 +164,7 @@ impl Default for Encoding<'_> {
     }
 }
 
-/// Checks, before there is a picture, that one could be written to `path`: its format is known, and
-/// its folder is there.
+/// Checks, before a picture is rendered, that one can be written to `path`: its format is known, and its folder exists.
 ///
 /// # Errors
 /// [`OutputError::UnknownFormat`] or [`OutputError::Io`].
@@ -175,7 +173,7 @@ pub fn check(path: &Path) -> Result<(), OutputError> {
     check_place(path)
 }
 
-/// Checks that a file could be written to `path`: its folder is there, and it is none itself.
+/// Checks that a file can be written to `path`: its folder exists, and it is not a folder itself.
 ///
 /// # Errors
 /// [`OutputError::Io`].
@@ -194,8 +192,8 @@ pub fn check_place(path: &Path) -> Result<(), OutputError> {
     Ok(())
 }
 
-/// Writes `picture` to `path`, in the format of its extension, over `background` if there is one.
-/// The file appears whole or not at all.
+/// Writes `picture` to `path`, in the format of its extension, over `background` if there is one. The write is atomic;
+/// see [`write_atomically`](crate::write_atomically).
 ///
 /// # Errors
 /// See [`OutputError`].
@@ -211,8 +209,8 @@ pub fn write(
     write_encoded(path, picture, &encoding)
 }
 
-/// Writes `picture` to `path`, in the format of its extension, as `encoding` says. The file appears
-/// whole or not at all.
+/// Writes `picture` to `path`, in the format of its extension, with the options `encoding`. The write is atomic; see
+/// [`write_atomically`](crate::write_atomically).
 ///
 /// # Errors
 /// See [`OutputError`].
@@ -234,8 +232,7 @@ pub fn write_encoded(
 
 /// The bytes of a file of `picture`.
 ///
-/// # Errors
-/// Why the picture doesn't fit the format.
+/// # Errors Returns the reason that the picture doesn't fit the format.
 pub fn encode(
     format: PictureFormat,
     picture: &Picture,
@@ -252,7 +249,7 @@ pub fn encode(
         PictureFormat::Jpeg => {
             let mut file = Vec::new();
             let mut encoder = jpeg_encoder::Encoder::new(&mut file, encoding.quality);
-            // As sharp in colour as in brightness where much is asked for.
+            // At high quality, colour is not subsampled.
             if encoding.quality >= 95 {
                 encoder.set_sampling_factor(jpeg_encoder::SamplingFactor::F_1_1);
             }
@@ -288,7 +285,7 @@ pub fn encode(
     }
 }
 
-/// Red, green and blue of each pixel in eight bits, over the background, which is black where there is none.
+/// Red, green and blue of each pixel in eight bits, over the background, which is black by default.
 pub fn rgb(picture: &Picture, encoding: &Encoding<'_>) -> Vec<u8> {
     let Encoding {
         background, colors, ..
@@ -341,7 +338,7 @@ fn png(picture: &Picture, encoding: &Encoding<'_>) -> Result<Vec<u8>, png::Encod
     Ok(file)
 }
 
-/// What EXR files say of their colours, in the attribute `colorSpace`.
+/// The value of the attribute `colorSpace` of EXR files.
 fn color_space(linear: bool) -> AttributeValue {
     AttributeValue::Text(Text::from(if linear {
         "linear light, Rec. 709 primaries, premultiplied"
@@ -350,7 +347,7 @@ fn color_space(linear: bool) -> AttributeValue {
     }))
 }
 
-/// The bytes of an OpenEXR file: the four channels as they are, and depths if there are some, uncompressed.
+/// The bytes of an OpenEXR file: the four channels unchanged, and depths if there are any, uncompressed.
 fn exr(picture: &Picture, encoding: &Encoding<'_>) -> Result<Vec<u8>, exr::error::Error> {
     let (width, height) = (picture.width as usize, picture.height as usize);
     let pixel = |index: usize| {
@@ -420,7 +417,7 @@ fn over_pixel([r, g, b, alpha]: [f32; 4], behind: [f32; 3]) -> [f32; 4] {
     ]
 }
 
-/// Linear light of a premultiplied sRGB colour, premultiplied too.
+/// A premultiplied sRGB colour, converted to premultiplied linear light.
 fn to_linear(colour: f32, alpha: f32) -> f32 {
     if alpha <= 0.0 {
         return 0.0;
@@ -434,7 +431,7 @@ fn to_linear(colour: f32, alpha: f32) -> f32 {
     linear * alpha
 }
 
-/// Colours are written as they are trained and drawn: no transfer function.
+/// Rounds a colour to eight bits, without a transfer function.
 fn to_byte(value: f32) -> u8 {
     (255.0 * value.clamp(0.0, 1.0)).round() as u8
 }
@@ -616,7 +613,7 @@ mod tests {
         assert!(matches!(check(&missing), Err(OutputError::Io { .. })));
         let missing = write(&missing, &picture(), None);
         assert!(matches!(missing, Err(OutputError::Io { .. })));
-        // The target is a folder: the rename fails after everything was written.
+        // The target is a folder, so that the rename fails after everything was written.
         let taken = folder.path().join("a.png");
         std::fs::create_dir(&taken).expect("a folder");
         assert!(matches!(check(&taken), Err(OutputError::Io { .. })));

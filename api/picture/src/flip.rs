@@ -1,4 +1,4 @@
-//! FLIP for low dynamic range: how visible a difference is when flipping between two images.
+//! FLIP for low dynamic range: the visibility of differences when flipping between two images.
 //!
 //! Andersson, Nilsson, Akenine-Möller, Oskarsson, Åström, Fairchild, "FLIP: A Difference Evaluator
 //! for Alternating Images", HPG 2020, with the constants of the authors' implementation. Colours
@@ -11,14 +11,14 @@ use std::f64::consts::PI;
 
 use rayon::prelude::*;
 
-/// A 0.7 m wide display of 3840 pixels seen from 0.7 m: pixels per degree of visual angle.
+/// The default pixels per degree of visual angle: a 0.7 m wide display of 3840 pixels seen from 0.7 m.
 pub const DEFAULT_PIXELS_PER_DEGREE: f64 = 3840.0 * PI / 180.0;
 
 /// Exponent of the colour difference.
 const QC: f64 = 0.7;
-/// Share of the greatest colour difference that [`PT`] of the error range is spent on.
+/// The share of the greatest colour difference that is mapped to the share [`PT`] of the error range.
 const PC: f64 = 0.4;
-/// See [`PC`].
+/// The share of the error range; see [`PC`].
 const PT: f64 = 0.95;
 /// Width of the feature detector in degrees.
 const W: f64 = 0.082;
@@ -52,7 +52,7 @@ pub fn flip(
         .collect()
 }
 
-/// What the eye makes of an image.
+/// An image after the filters of human vision.
 struct Perceived {
     /// Filtered colour in Hunt-adjusted L*a*b*.
     color: Vec<[f64; 3]>,
@@ -226,7 +226,7 @@ fn xyz_to_linear([x, y, z]: [f64; 3]) -> [f64; 3] {
     ]
 }
 
-/// A linear form of L*a*b*, in which filters may be applied.
+/// Converts to YCxCz, a linear form of L*a*b*, in which filters may be applied.
 fn xyz_to_ycxcz(xyz: [f64; 3]) -> [f64; 3] {
     let [x, y, z] = std::array::from_fn(|i| xyz[i] / WHITE[i]);
     [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
@@ -251,23 +251,23 @@ fn xyz_to_lab(xyz: [f64; 3]) -> [f64; 3] {
     [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
 }
 
-/// Colours look more colourful where they are brighter (the Hunt effect).
+/// Applies the Hunt effect: colours look more colourful where they are brighter.
 fn hunt([l, a, b]: [f64; 3]) -> [f64; 3] {
     [l, 0.01 * l * a, 0.01 * l * b]
 }
 
-/// City-block distance in lightness, Euclidean in the other two.
+/// The HyAB distance: city-block in lightness, Euclidean in the other two.
 fn hyab(p: [f64; 3], q: [f64; 3]) -> f64 {
     (p[0] - q[0]).abs() + (p[1] - q[1]).hypot(p[2] - q[2])
 }
 
-/// The distance from green to blue, the greatest there is.
+/// The greatest colour difference, which is that from green to blue.
 fn greatest_color_difference() -> f64 {
     let perceived = |rgb| hunt(xyz_to_lab(linear_to_xyz(rgb)));
     hyab(perceived([0.0, 1.0, 0.0]), perceived([0.0, 0.0, 1.0]))
 }
 
-/// Maps differences to 0 to 1, spending most of the range on small ones.
+/// Maps differences to 0 to 1, and most of the range to small ones.
 fn redistribute(difference: f64, greatest: f64) -> f64 {
     let knee = PC * greatest;
     if difference < knee {
@@ -334,9 +334,8 @@ mod tests {
 
     #[test]
     fn values_of_flat_images() {
-        // From the same implementation, but for the last, which holds by definition. On a flat
-        // image its binary32 filters see features of about 1e-7, whose root, 3e-4, is in the
-        // exponent; hence the tolerance.
+        // Values of the same implementation, except for the last, which holds by definition. On a flat image its
+        // binary32 filters find features of about 1e-7, whose root, 3e-4, is in the exponent; hence the tolerance.
         let flat = |rgb| vec![rgb; 64];
         for (reference, test, expected) in [
             ([1.0; 3], [0.0; 3], 0.967388),

@@ -1,4 +1,4 @@
-//! Pictures of 32-bit floats: files that appear whole or not at all, and how much two pictures differ.
+//! Pictures of 32-bit floats: files that are written atomically, and differences between pictures.
 
 mod atomic;
 mod color;

@@ -1,11 +1,11 @@
 //! A picture in memory.
 
-/// Pixels as a draw leaves them: RGBA in rows from the top, premultiplied.
+/// A drawn picture: premultiplied RGBA pixels, in rows from the top.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
-    /// Pixels in a row.
+    /// The number of pixels in a row.
     pub width: u32,
-    /// Rows.
+    /// The number of rows.
     pub height: u32,
     /// (C, 1 - T) of each pixel; `width` times `height` of them.
     pub pixels: Vec<[f32; 4]>,

@@ -1,4 +1,4 @@
-//! Pictures from files.
+//! Reading of picture files.
 
 use std::fs::File;
 use std::io::{BufReader, Read};
@@ -9,14 +9,13 @@ use exr::prelude::{ReadChannels, ReadLayers};
 use crate::files::{OutputError, PictureFormat};
 use crate::picture::Picture;
 
-/// The most pixels of a picture that is read: larger ones are more likely to be damaged.
+/// The most pixels of a picture that is read. A larger size is probably a damaged header.
 const MAX_PIXELS: u64 = 1 << 29;
 
-/// Reads the picture file at `path`, by its extension: eight or sixteen bits become 0 to 1 and are premultiplied by
-/// alpha; floats stay as they are.
+/// Reads the picture file at `path`, whose extension gives the format. Values of eight or sixteen bits are scaled to 0
+/// to 1 and premultiplied by alpha; floats are unchanged.
 ///
-/// # Errors
-/// [`OutputError::UnknownFormat`], [`OutputError::Io`], or [`OutputError::Encode`] for a file that is damaged.
+/// # Errors [`OutputError::UnknownFormat`], [`OutputError::Io`], or [`OutputError::Encode`] for a file that is damaged.
 pub fn read(path: &Path) -> Result<Picture, OutputError> {
     let format = PictureFormat::of(path)?;
     let io = |source| OutputError::Io {
@@ -38,7 +37,7 @@ pub fn read(path: &Path) -> Result<Picture, OutputError> {
     picture.map_err(damaged)
 }
 
-/// Checks a size before memory is taken for it.
+/// Checks a size before memory is allocated for it.
 fn sized(width: u64, height: u64) -> Result<(), String> {
     if width.saturating_mul(height) > MAX_PIXELS {
         return Err(format!("{width}x{height} pixels are more than are read"));
@@ -46,7 +45,7 @@ fn sized(width: u64, height: u64) -> Result<(), String> {
     Ok(())
 }
 
-/// A picture of `channels` values a pixel, 1 to 4, each 0 to 1.
+/// A picture from `channels` values a pixel, 1 to 4, each 0 to 1.
 fn picture(width: u32, height: u32, channels: usize, values: impl Iterator<Item = f32>) -> Picture {
     let values: Vec<f32> = values.collect();
     let pixel = |values: &[f32]| {

@@ -1,7 +1,7 @@
-//! SSIM: how alike the structure of two images is.
+//! SSIM: the structural similarity of two images.
 //!
-//! Wang, Bovik, Sheikh, Simoncelli, "Image Quality Assessment: From Error Visibility to Structural Similarity", 2004, as
-//! the original 3DGS code computes it: a Gaussian window of 11x11 with a standard deviation of 1.5, zeros beyond the
+//! Wang, Bovik, Sheikh, Simoncelli, "Image Quality Assessment: From Error Visibility to Structural Similarity", 2004,
+//! as the original 3DGS code computes it: a Gaussian window of 11x11 with a standard deviation of 1.5, zeros beyond the
 //! border, constants 0.01 and 0.03, the mean over pixels and channels.
 
 use rayon::prelude::*;
@@ -10,15 +10,14 @@ use rayon::prelude::*;
 const RADIUS: usize = 5;
 /// The window's standard deviation.
 const SIGMA: f64 = 1.5;
-/// The squares of the two constants times the range, which is 1.
+/// The square of the first constant times the range, which is 1.
 const C1: f64 = 0.01 * 0.01;
-/// See [`C1`].
+/// The square of the second constant times the range.
 const C2: f64 = 0.03 * 0.03;
 
-/// The mean SSIM of red, green and blue, at most 1, which equal images have. Rows have `width` pixels.
+/// The mean SSIM of red, green and blue, at most 1, which is the value of equal images. Rows have `width` pixels.
 ///
-/// # Panics
-/// If the sizes differ.
+/// # Panics Panics if the sizes differ.
 pub fn ssim(image: &[[f32; 4]], reference: &[[f32; 4]], width: u32) -> f64 {
     assert_eq!(image.len(), reference.len(), "the sizes differ");
     if image.is_empty() {
@@ -108,8 +107,8 @@ mod tests {
 
     #[test]
     fn flat_images_follow_the_formula() {
-        // Far from the border there is no variance: (2xy + C1) / (x^2 + y^2 + C1), and each pixel of a picture without
-        // a border pixel near would have it. One pixel alone has the window's centre as its weight.
+        // Far from the border there is no variance: a pixel's value is (2xy + C1) / (x^2 + y^2 + C1). A single pixel
+        // has the window's centre as its weight.
         let (a, b) = (grey(|_| 0.25, 1), grey(|_| 0.75, 1));
         let weight = window()[RADIUS].powi(2);
         let (x, y) = (0.25 * weight, 0.75 * weight);

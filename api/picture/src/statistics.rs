@@ -1,4 +1,4 @@
-//! How different two pictures are, in numbers that people know.
+//! Statistics of the differences between two pictures.
 
 use std::fmt;
 
@@ -7,9 +7,9 @@ use crate::flip;
 /// Differences between an image and a reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Statistics {
-    /// Greatest absolute difference of any of the four channels.
+    /// The greatest absolute difference of any of the four channels.
     pub max: f64,
-    /// 99.9th percentile over the pixels of each pixel's greatest difference.
+    /// The 99.9th percentile, over the pixels, of each pixel's greatest difference.
     pub p999: f64,
     /// Peak signal-to-noise ratio in dB over red, green and blue, the peak being 1; infinite for
     /// equal images.
@@ -19,7 +19,7 @@ pub struct Statistics {
 }
 
 impl Statistics {
-    /// Compares two images of `width` pixels a row.
+    /// Compares two images with `width` pixels in a row.
     pub fn new(image: &[[f32; 4]], reference: &[[f32; 4]], width: u32) -> Self {
         assert_eq!(image.len(), reference.len(), "the sizes differ");
         let differences = || {
@@ -61,7 +61,7 @@ impl fmt::Display for Statistics {
     }
 }
 
-/// The value that `share` of the ascending `values` don't exceed; 0 if there are none.
+/// The value that a `share` of the ascending `values` does not exceed; 0 if there are none.
 fn percentile(values: &[f64], share: f64) -> f64 {
     let rank = (share * values.len() as f64).ceil() as usize;
     values.get(rank.saturating_sub(1)).copied().unwrap_or(0.0)
@@ -90,7 +90,7 @@ mod tests {
     fn known_differences() {
         let reference = vec![[0.5; 4]; 2000];
         let mut image = reference.clone();
-        // Two of 2000 pixels are the 99.9th percentile's, one more is beyond it.
+        // Two of 2000 pixels are the 99.9th percentile; one more exceeds it.
         image[0] = [0.75, 0.5, 0.5, 0.5];
         image[1] = [0.5, 0.5, 0.5, 0.625];
         image[2] = [0.5, 0.625, 0.5, 0.5];

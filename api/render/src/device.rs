@@ -14,7 +14,7 @@ use crate::error::{During, RenderError};
 /// An instance, which outlives everything made from it.
 struct Instance {
     raw: ash::Instance,
-    /// Last: it may own the library that `raw` calls.
+    /// The last field, so that it is dropped last: it may own the library that `raw` calls.
     _entry: ash::Entry,
 }
 
@@ -38,27 +38,27 @@ impl Drop for Instance {
     }
 }
 
-/// What a device is wanted for.
+/// The purpose of a device.
 #[derive(Clone, Copy, Debug)]
 pub enum Purpose<'a> {
-    /// The Gaussian primitive topology.
+    /// Drawing with the Gaussian primitive topology.
     Gaussians,
-    /// Triangles alone, on the first device whose name holds this text.
+    /// Drawing triangles only, on the first device whose name contains this text.
     Triangles(&'a str),
 }
 
-/// A logical device, its queue, and what is known about it.
+/// A logical device, its queue, and its properties.
 pub struct Device {
     raw: ash::Device,
     queue: vk::Queue,
-    /// Absent if the device doesn't count.
+    /// The functions of performance queries; None if the device doesn't support them.
     performance: Option<ash::khr::performance_query::Device>,
     physical: PhysicalDevice,
-    /// Last: the device is its child.
+    /// The last field, so that it is dropped last: the device is its child.
     instance: Instance,
 }
 
-/// A physical device and the queue family that is used.
+/// A physical device and its queue family.
 struct PhysicalDevice {
     handle: vk::PhysicalDevice,
     queue_family: u32,
@@ -71,10 +71,9 @@ struct PhysicalDevice {
 }
 
 impl Device {
-    /// The first device of `entry` that serves the purpose.
+    /// Creates a device on the first physical device of `entry` that serves the purpose.
     ///
-    /// # Errors
-    /// If there is none, or Vulkan fails.
+    /// # Errors Returns an error if there is none, or Vulkan fails.
     pub fn new(entry: ash::Entry, purpose: Purpose<'_>) -> Result<Self, RenderError> {
         let instance = Instance::new(entry)?;
         let physical = PhysicalDevice::choose(&instance.raw, purpose)?;
@@ -84,7 +83,7 @@ impl Device {
             .queue_family_index(physical.queue_family)
             .queue_priorities(&priorities)];
         let mut extensions = Vec::new();
-        // Every mode that there is.
+        // Every feature of the extension is enabled if it is supported.
         let mut gaussian = GaussianFeatures::default();
         let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut gaussian);
         // SAFETY: the structures are valid; a device without the extension leaves its structure as it is.
@@ -120,7 +119,7 @@ impl Device {
         }
         .during("vkCreateDevice")?;
         Ok(Self {
-            // SAFETY: the queue was asked for at creation.
+            // SAFETY: the queue was requested at creation.
             queue: unsafe { raw.get_device_queue(physical.queue_family, 0) },
             performance: physical
                 .counts
@@ -136,7 +135,7 @@ impl Device {
         &self.raw
     }
 
-    /// The one queue.
+    /// The queue; the device has only one.
     pub fn queue(&self) -> vk::Queue {
         self.queue
     }
@@ -146,13 +145,12 @@ impl Device {
         self.physical.queue_family
     }
 
-    /// The functions of the Gaussian primitive topology, for a device that was made to draw
-    /// Gaussians.
+    /// The functions of the Gaussian primitive topology, for a device created to draw Gaussians.
     pub(super) fn gaussian_functions(&self) -> gaussian_primitive_topology::Device {
         gaussian_primitive_topology::Device::new(&self.instance.raw, &self.raw)
     }
 
-    /// The functions of performance queries, if the device counts.
+    /// The functions of performance queries, if the device supports them.
     pub(super) fn performance(&self) -> Option<&ash::khr::performance_query::Device> {
         self.performance.as_ref()
     }
@@ -175,8 +173,8 @@ impl Device {
         self.physical.max_sh_degree
     }
 
-    /// The first memory type allowed by `type_bits` that has the properties of one of `wishes`,
-    /// tried in order: those that it must have and those that it must not.
+    /// The first memory type allowed by `type_bits` that satisfies one of `wishes`, tried in order. A wish is the
+    /// properties that the type must have and those that it must not have.
     pub fn memory_type(
         &self,
         type_bits: u32,
@@ -193,7 +191,7 @@ impl Device {
         })
     }
 
-    /// The counters that the queue can count, with their descriptions.
+    /// The queue's counters, with their descriptions.
     pub(super) fn counters(&self) -> Result<Vec<CounterDescription>, RenderError> {
         let instance =
             ash::khr::performance_query::Instance::new(&self.instance._entry, &self.instance.raw);
@@ -239,7 +237,7 @@ impl Device {
             .collect())
     }
 
-    /// How many submissions it takes to count what `create_info` names.
+    /// The number of submissions that are needed to count what `create_info` names.
     pub(super) fn counter_passes(
         &self,
         create_info: &vk::QueryPoolPerformanceCreateInfoKHR<'_>,
@@ -262,7 +260,7 @@ pub(super) struct CounterDescription {
     pub(super) category: String,
     pub(super) name: String,
     pub(super) description: String,
-    /// Counting it changes how long things take.
+    /// True if counting it changes performance.
     pub(super) impacting: bool,
     pub(super) unit: vk::PerformanceCounterUnitKHR,
     pub(super) storage: vk::PerformanceCounterStorageKHR,
@@ -340,7 +338,7 @@ impl PhysicalDevice {
         let Some(queue_family) = graphics else {
             return Ok(None);
         };
-        // A device without the extension leaves its limits as they are: zero.
+        // A device without the extension leaves its limits at zero.
         let mut gaussian = GaussianProperties::default();
         let mut chain = vk::PhysicalDeviceProperties2::default();
         if has(gaussian_primitive_topology::NAME) {

@@ -11,6 +11,6 @@ pub struct DeviceScene {
     pub(crate) stored_degree: u32,
     pub(crate) settings: Settings,
     pub(crate) pipeline: GaussianPipeline,
-    /// One for each of [`BINDINGS`].
+    /// A buffer for each of [`BINDINGS`].
     pub(crate) buffers: [Buffer; BINDINGS],
 }

@@ -11,7 +11,7 @@ use crate::target::Target;
 use gaurast_scene::Camera;
 use gaurast_scene::camera::Model;
 
-/// A recorder of draws into a command buffer.
+/// Records draws into a command buffer.
 pub(super) struct Recorder<'a> {
     pub(super) device: &'a Device,
     pub(super) gaussian: &'a gaussian_primitive_topology::Device,
@@ -20,7 +20,7 @@ pub(super) struct Recorder<'a> {
 }
 
 impl Recorder<'_> {
-    /// Draws `scene` into the target's image, which is then in the layout of an attachment.
+    /// Draws `scene` into the target's image, which is then in the layout of a colour attachment.
     pub(super) fn record(&self, target: &Target, scene: &DeviceScene, camera: &Camera) {
         let (image, pipeline) = (&target.image, &scene.pipeline);
         let mut vulkan = camera.to_vulkan();
@@ -99,9 +99,9 @@ impl Recorder<'_> {
     }
 }
 
-/// How a camera's depths are held in 0 to 1, and what they are again.
+/// The mapping of a camera's depths to values from 0 to 1, and back.
 pub(super) struct DepthScale {
-    /// A depth z is held as the first plus the second divided by z; or times z, for parallel rays.
+    /// The value of a depth z is the first coefficient plus the second divided by z; times z if orthographic.
     pub(super) coefficients: [f32; 2],
     parallel: bool,
 }
@@ -113,7 +113,7 @@ impl DepthScale {
         let coefficients = if parallel {
             [-near / (far - near), 1.0 / (far - near)]
         } else {
-            // The reciprocal keeps its digits at every distance; nothing is at 0.
+            // The reciprocal keeps its precision at every distance. The value 0 means that nothing is there.
             [0.0, near]
         };
         Self {
@@ -122,7 +122,7 @@ impl DepthScale {
         }
     }
 
-    /// The depth that is held as `value`; infinite where nothing is, at 0.
+    /// The depth of `value`; infinite for 0, which means that nothing is there.
     pub(super) fn depth(&self, value: f32) -> f32 {
         let [constant, factor] = self.coefficients;
         if value == 0.0 {

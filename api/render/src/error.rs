@@ -4,7 +4,7 @@ use ash::vk;
 use gaurast_scene::camera::CameraError;
 use thiserror::Error;
 
-/// Why rendering failed.
+/// The reason that rendering failed.
 #[derive(Debug, Error)]
 pub enum RenderError {
     /// A Vulkan call failed.
@@ -18,18 +18,18 @@ pub enum RenderError {
     /// No device draws Gaussians.
     #[error("no Vulkan device draws Gaussians (there is {found})")]
     NoDevice {
-        /// The devices there are.
+        /// The names of the devices that were found.
         found: String,
     },
-    /// No device has the name that is wanted.
+    /// No device has the requested name.
     #[error("no Vulkan device has \"{name}\" in its name and Vulkan 1.3 (there is {found})")]
     NoSuchDevice {
-        /// The part of a name.
+        /// The requested part of a name.
         name: String,
-        /// The devices there are.
+        /// The names of the devices that were found.
         found: String,
     },
-    /// No memory type will do.
+    /// No memory type has the required properties.
     #[error("the device has no {0} memory for a resource")]
     NoMemory(&'static str),
     /// The picture is too large or empty.
@@ -50,20 +50,19 @@ pub enum RenderError {
         /// The most in a draw.
         max: u64,
     },
-    /// The camera cannot be drawn with.
+    /// The camera is invalid.
     #[error(transparent)]
     Camera(#[from] CameraError),
-    /// The device doesn't draw modes together.
+    /// The device doesn't support this combination of modes.
     #[error("{0}")]
     Combination(&'static str),
 }
 
 /// Names the call that a Vulkan error came from.
 pub trait During<T> {
-    /// The value, or the error with the name of the `call` that it came from.
+    /// Returns the value, or the error with the name of the `call` that failed.
     ///
-    /// # Errors
-    /// If the call failed.
+    /// # Errors Returns an error if the call failed.
     fn during(self, call: &'static str) -> Result<T, RenderError>;
 }
 

@@ -14,7 +14,7 @@
 //! # }
 //! ```
 //!
-//! [`Renderer::upload`] and [`Renderer::render`] draw a scene many times. A picture made on the spot:
+//! [`Renderer::upload`] and [`Renderer::render`] draw a scene many times. A generated scene needs no file:
 //!
 //! ```
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {

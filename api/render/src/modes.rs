@@ -1,4 +1,4 @@
-//! Modes of the pipeline that change what a picture is, not what it costs.
+//! Modes of the pipeline that change the picture, not the cost.
 
 use gaurast::vk::{
     GaussianAntialiasingGAURAST, GaussianGeometryGAURAST, GaussianOrderGAURAST,
@@ -6,20 +6,20 @@ use gaurast::vk::{
 };
 use serde::{Deserialize, Serialize};
 
-/// What Gaussians are sorted by.
+/// The key by which Gaussians are sorted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Order {
-    /// Depth along the camera's axis, as 3DGS does.
+    /// Depth along the camera's axis, as in 3DGS.
     #[default]
     Depth,
     /// Distance from the camera.
     Distance,
-    /// Depth along each pixel's own ray: nothing pops as the camera turns.
+    /// Depth along each pixel's own ray: no Gaussian pops as the camera turns.
     PerPixel,
 }
 
 impl Order {
-    /// As the pipeline is told.
+    /// The value for the pipeline.
     pub(crate) fn raw(self) -> GaussianOrderGAURAST {
         match self {
             Self::Depth => GaussianOrderGAURAST::VIEW_DEPTH,
@@ -29,18 +29,18 @@ impl Order {
     }
 }
 
-/// What Gaussians are in space.
+/// The shape of Gaussians in space.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Geometry {
-    /// Volumes with three axes, as of 3DGS.
+    /// Volumes with three axes, as in 3DGS.
     #[default]
     Volume,
-    /// Flat discs with two, as of 2DGS; a third scale is not looked at
+    /// Flat discs with two axes, as in 2DGS; a third scale is ignored.
     Surfel,
 }
 
 impl Geometry {
-    /// As the pipeline is told.
+    /// The value for the pipeline.
     pub(crate) fn raw(self) -> GaussianGeometryGAURAST {
         match self {
             Self::Volume => GaussianGeometryGAURAST::GAUSSIAN_3D,
@@ -48,7 +48,7 @@ impl Geometry {
         }
     }
 
-    /// The variance of the filter that goes with it, in px^2.
+    /// The variance of the screen filter for this shape, in px^2.
     pub(crate) fn low_pass_variance(self) -> f32 {
         match self {
             Self::Volume => 0.3,
@@ -68,7 +68,7 @@ pub enum Precision {
 }
 
 impl Precision {
-    /// As the pipeline is told.
+    /// The value for the pipeline.
     pub(crate) fn raw(self) -> GaussianPrecisionGAURAST {
         match self {
             Self::Fp32 => GaussianPrecisionGAURAST::FLOAT32,
@@ -77,18 +77,18 @@ impl Precision {
     }
 }
 
-/// What becomes of Gaussians that are smaller than a pixel.
+/// The treatment of Gaussians that are smaller than a pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Antialiasing {
-    /// They are dilated and keep their opacity, as 3DGS does: what is far off looks too thick.
+    /// They are dilated and keep their opacity, as in 3DGS: distant ones look too thick.
     #[default]
     Dilate,
-    /// Their opacity makes up for the dilation: for scenes that are trained so.
+    /// They are dilated and lose opacity in proportion, for scenes that are trained so.
     Compensated,
 }
 
 impl Antialiasing {
-    /// As the pipeline is told.
+    /// The value for the pipeline.
     pub(crate) fn raw(self) -> GaussianAntialiasingGAURAST {
         match self {
             Self::Dilate => GaussianAntialiasingGAURAST::DILATE,

@@ -15,7 +15,7 @@ use crate::settings::Settings;
 use crate::target::DEPTHS_FORMAT;
 use gaurast_scene::GaussianShape;
 
-/// Vertex buffers: positions, shapes, spherical harmonics.
+/// The number of vertex buffers: positions, shapes, spherical harmonics.
 pub(super) const BINDINGS: usize = 3;
 
 /// The first location of the spherical harmonics; those before are position, scale, rotation and
@@ -30,9 +30,9 @@ pub(super) struct GaussianPipeline {
 }
 
 impl GaussianPipeline {
-    /// A pipeline for vertex buffers of `strides`, that draws by `settings` (with a degree that is
-    /// stored) into an attachment of `format`, in place of what it holds; and depths into one of [`DEPTHS_FORMAT`] after it
-    /// if the settings have them.
+    /// A pipeline for vertex buffers of `strides`. It draws with `settings`, whose degree must be stored, into an
+    /// attachment of `format`, whose contents it replaces. If the settings have depths, it writes them to a second
+    /// attachment, of [`DEPTHS_FORMAT`].
     pub(super) fn new(
         device: &Arc<Device>,
         strides: [u32; BINDINGS],
@@ -66,7 +66,7 @@ impl GaussianPipeline {
         let rasterization = vk::PipelineRasterizationStateCreateInfo::default().line_width(1.0);
         let multisample = vk::PipelineMultisampleStateCreateInfo::default()
             .rasterization_samples(vk::SampleCountFlags::TYPE_1);
-        // Without blending the attachment takes (C, 1 - T) itself.
+        // Without blending, (C, 1 - T) is written to the attachment.
         let attachments = [vk::PipelineColorBlendAttachmentState::default()
             .color_write_mask(vk::ColorComponentFlags::RGBA); 2];
         let formats = [format, DEPTHS_FORMAT];
@@ -135,14 +135,14 @@ impl GaussianPipeline {
     }
 }
 
-/// The shader that hands a pixel's colour and depths on, or none.
+/// The fragment shader that writes a pixel's colour and depths; null if there is none.
 struct ShaderModule {
     handle: vk::ShaderModule,
     device: Arc<Device>,
 }
 
 impl ShaderModule {
-    /// The module, if depths are `wanted`.
+    /// Creates the module, if depths are `wanted`.
     fn new(device: &Arc<Device>, wanted: bool) -> Result<Self, RenderError> {
         let mut module = Self {
             handle: vk::ShaderModule::null(),
@@ -161,7 +161,7 @@ impl ShaderModule {
         Ok(module)
     }
 
-    /// The pipeline's stages of it.
+    /// The pipeline stages that use the module.
     fn stages(&self) -> Vec<vk::PipelineShaderStageCreateInfo<'static>> {
         let stage = vk::PipelineShaderStageCreateInfo::default()
             .stage(vk::ShaderStageFlags::FRAGMENT)
@@ -184,7 +184,7 @@ impl Drop for ShaderModule {
     }
 }
 
-/// Where a Gaussian's numbers lie in the vertex buffers.
+/// The vertex attributes: the places of a Gaussian's numbers in the vertex buffers.
 fn attributes(sh_degree: u32) -> Vec<vk::VertexInputAttributeDescription> {
     let attribute = |location: u32, binding: u32, format, offset: usize| {
         vk::VertexInputAttributeDescription::default()

@@ -1,4 +1,4 @@
-//! What the process uses: processor time and memory, as Linux tells. Elsewhere nothing is known.
+//! The processor time and memory of the process, on Linux. Elsewhere there is no data.
 
 use std::fs;
 use std::time::Duration;
@@ -6,16 +6,16 @@ use std::time::Duration;
 #[cfg(target_os = "linux")]
 use rustix::time::{ClockId, clock_gettime};
 
-/// The processor time that the process has spent so far in all of its threads, ended ones included.
+/// The processor time of all threads of the process so far, including ended ones.
 pub fn processor_time() -> Option<Duration> {
-    // Summing up the threads would lose the time of those that end meanwhile.
+    // The sum over the threads would lose the time of those that end meanwhile.
     #[cfg(target_os = "linux")]
     return Duration::try_from(clock_gettime(ClockId::ProcessCPUTime)).ok();
     #[cfg(not(target_os = "linux"))]
     None
 }
 
-/// The most bytes of memory that the process has held since [`reset_peak_memory`].
+/// The greatest memory use of the process since [`reset_peak_memory`], in bytes.
 pub fn peak_memory() -> Option<u64> {
     let status = fs::read_to_string("/proc/self/status").ok()?;
     let line = status
@@ -25,9 +25,9 @@ pub fn peak_memory() -> Option<u64> {
     Some(kibibytes * 1024)
 }
 
-/// Begins to look for the peak anew.
+/// Resets the peak of [`peak_memory`].
 pub fn reset_peak_memory() {
-    // Where it fails, the peak is that of the whole process.
+    // If it fails, the peak is that of the whole process.
     let _ = fs::write("/proc/self/clear_refs", "5");
 }
 

@@ -1,4 +1,4 @@
-//! The device's counters, by `VK_KHR_performance_query`.
+//! The device's counters, read by `VK_KHR_performance_query`.
 
 use std::sync::Arc;
 
@@ -7,26 +7,26 @@ use ash::vk;
 use crate::device::{CounterDescription, Device};
 use crate::error::{During, RenderError};
 
-/// How long to wait for the profiling lock.
+/// The time to wait for the profiling lock, in nanoseconds.
 const LOCK_TIMEOUT: u64 = 10_000_000_000;
 
-/// What a counter of the device counted in a draw.
+/// The value of a device's counter for a draw.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Counter {
     /// The group it belongs to.
     pub category: String,
     /// Its name.
     pub name: String,
-    /// What it means, in a sentence.
+    /// A sentence about its meaning.
     pub description: String,
     /// The unit of `value`.
     pub unit: vk::PerformanceCounterUnitKHR,
-    /// What it counted; whole numbers are exact up to 2^53.
+    /// The value; whole numbers are exact up to 2^53.
     pub value: f64,
 }
 
-/// A query of everything that the device counts. It holds the device's profiling lock as long as
-/// it lives, since the lock must be held from recording to execution.
+/// A query of all counters of the device. It holds the device's profiling lock as long as it exists, because the lock
+/// must be held from recording to execution.
 pub(super) struct CounterQuery {
     pool: vk::QueryPool,
     counters: Vec<CounterDescription>,
@@ -35,8 +35,8 @@ pub(super) struct CounterQuery {
 }
 
 impl CounterQuery {
-    /// The query, unless the device counts nothing or not everything at once. What would impact its performance is
-    /// counted only if it is asked for.
+    /// Creates the query. None if the device has no counters or can't count all of them in one pass. Counters that
+    /// affect performance are included only if `impacting`.
     pub(super) fn new(device: &Arc<Device>, impacting: bool) -> Result<Option<Self>, RenderError> {
         let Some(performance_query) = device.performance() else {
             return Ok(None);
@@ -83,7 +83,7 @@ impl CounterQuery {
         };
     }
 
-    /// Records the query's beginning.
+    /// Records the query's begin.
     pub(super) fn begin(&self, commands: vk::CommandBuffer) {
         let flags = vk::QueryControlFlags::empty();
         // SAFETY: the command buffer is recording and holds nothing yet, the profiling lock is
@@ -101,7 +101,7 @@ impl CounterQuery {
         unsafe { self.device.raw().cmd_end_query(commands, self.pool, 0) };
     }
 
-    /// What was counted, once the query's submission has ended.
+    /// The values of the counters, after the query's submission has ended.
     pub(super) fn read(&self) -> Result<Vec<Counter>, RenderError> {
         let zero = vk::PerformanceCounterResultKHR { uint64: 0 };
         let mut results = vec![zero; self.counters.len()];
@@ -138,7 +138,7 @@ impl CounterQuery {
     }
 }
 
-/// The number in a result.
+/// The number in a counter's result.
 fn value(
     storage: vk::PerformanceCounterStorageKHR,
     result: vk::PerformanceCounterResultKHR,

@@ -1,4 +1,4 @@
-//! The renderer: scenes to device memory, and frames of them to the host.
+//! The renderer: copies scenes to device memory, and draws frames of them into host memory.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -19,10 +19,10 @@ use crate::resource::{Buffer, CommandBuffers, Memory};
 use crate::settings::Settings;
 use crate::target::{COLOR_FORMAT, Target, check_size, record_copy};
 
-/// Bytes that go to the device at once.
+/// The most bytes that are copied to the device at once.
 const STAGING: u64 = 64 << 20;
 
-/// A device that draws Gaussians, and what it needs from frame to frame.
+/// A device that draws Gaussians, with the objects that it reuses for each frame.
 pub struct Renderer {
     query: Option<CounterQuery>,
     target: Option<Target>,
@@ -31,22 +31,22 @@ pub struct Renderer {
     device: Arc<Device>,
 }
 
-/// A rendered picture and what it cost.
+/// A rendered picture and its cost.
 #[derive(Clone, Debug)]
 pub struct Frame {
-    /// (C, 1 - T) of every pixel, over nothing.
+    /// (C, 1 - T) of every pixel, without a background.
     pub picture: Picture,
-    /// From the submission to its end, the copy to the host included.
+    /// The time from the submission to its end, including the copy to the host.
     pub time: Duration,
-    /// What all threads of the process spent meanwhile, if the system tells.
+    /// The processor time of all threads of the process in that time, if the system reports it.
     pub processor_time: Option<Duration>,
-    /// The device's counters of the draw, in its order; none if it has none.
+    /// The device's counters of the draw, in its order; empty if it has none.
     pub counters: Vec<Counter>,
-    /// The expected and the median depth of every pixel, if the settings keep them; infinite where nothing is.
+    /// The expected and the median depth of every pixel, if the settings ask for them; infinite where nothing is drawn.
     ///
     /// Depth is the distance along the camera's axis, or from the eye for a fisheye and a panorama. The expected depth
-    /// is the reciprocal of the mean reciprocal, weighted as colours are (the mean itself for parallel rays); the
-    /// median is that of the Gaussian at which half of the light is gone, or of the last one.
+    /// is the reciprocal of the mean reciprocal depth, weighted as colours are (the mean depth itself if orthographic).
+    /// The median depth is that of the Gaussian at which transmittance falls below one half, or of the last one.
     pub depth: Option<Vec<[f32; 2]>>,
 }
 
@@ -66,12 +66,11 @@ impl Renderer {
         })
     }
 
-    /// Counts also what changes how long things take, such as what simulated hardware would spend.
+    /// Includes counters that affect performance, such as those of simulated hardware.
     ///
-    /// # Errors
-    /// If Vulkan fails.
+    /// # Errors Returns an error if Vulkan fails.
     pub fn count_everything(&mut self) -> Result<(), RenderError> {
-        // A device has one profiling lock.
+        // A device has only one profiling lock.
         self.query = None;
         self.query = CounterQuery::new(&self.device, true)?;
         Ok(())
@@ -121,7 +120,7 @@ impl Renderer {
         })
     }
 
-    /// Draws `scene` once, as `camera` sees it, by 3DGS's settings.
+    /// Draws `scene` once, as `camera` sees it, with 3DGS's settings.
     ///
     /// # Errors
     /// As [`Renderer::upload`] and [`Renderer::render`].
@@ -130,7 +129,7 @@ impl Renderer {
         Ok(self.render(&scene, camera)?.picture)
     }
 
-    /// Draws `scene` by other settings from now on.
+    /// Draws `scene` with other settings from now on.
     ///
     /// # Errors
     /// If Vulkan fails.
@@ -153,11 +152,11 @@ impl Renderer {
         GaussianPipeline::new(&self.device, strides, settings, COLOR_FORMAT)
     }
 
-    /// A device-local vertex buffer of `bytes`, by way of a staging buffer.
+    /// A device-local vertex buffer of `bytes`, copied through a staging buffer.
     fn upload_bytes(&mut self, bytes: &[u8]) -> Result<Buffer, RenderError> {
         use vk::BufferUsageFlags as Usage;
         let usage = Usage::VERTEX_BUFFER | Usage::TRANSFER_DST;
-        // Vulkan has no empty buffers; an empty scene is drawn with none of this read.
+        // Vulkan has no empty buffers; an empty scene is drawn without reading this one.
         let size = (bytes.len() as u64).max(4);
         let buffer = Buffer::new(&self.device, size, usage, Memory::Device)?;
         let staging_size = size.min(STAGING);
@@ -204,8 +203,7 @@ impl Renderer {
 
     /// Draws `scene` as `camera` sees it, in a picture of the camera's size.
     ///
-    /// # Errors
-    /// If the size is not within the device's limits, modes don't go together, or Vulkan fails.
+    /// # Errors Returns an error if the size exceeds the device's limits, modes can't be combined, or Vulkan fails.
     pub fn render(&mut self, scene: &DeviceScene, camera: &Camera) -> Result<Frame, RenderError> {
         let (width, height) = (camera.width, camera.height);
         check_size(&self.device, width, height)?;
@@ -222,8 +220,8 @@ impl Renderer {
         };
         let target = self.target.insert(target);
 
-        // A query is not reset in the submission that it begins in, and it spans a whole command
-        // buffer, so that counters of any scope will do.
+        // A query is not reset in the submission in which it begins, and it spans a whole command buffer, so that
+        // counters of any scope can be used.
         if let Some(query) = &self.query {
             self.commands
                 .record(0, |_, commands| query.reset(commands))?;

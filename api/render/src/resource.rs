@@ -9,19 +9,19 @@ use bytemuck::Pod;
 use crate::device::Device;
 use crate::error::{During, RenderError};
 
-/// Which memory a resource lives in.
+/// The kind of memory of a resource.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Memory {
-    /// The device's own, not host-visible if there is such a type.
+    /// Device-local memory, not host-visible if there is such a type.
     Device,
-    /// Coherent with the host, for writing.
+    /// Host-coherent memory, for writing.
     Host,
-    /// Coherent with the host, for reading.
+    /// Host-coherent memory, for reading.
     HostCached,
 }
 
 impl Memory {
-    /// Properties that a memory type must have and must not have, the best first.
+    /// The properties that a memory type must have and must not have, the best first.
     fn wishes(self) -> &'static [(vk::MemoryPropertyFlags, vk::MemoryPropertyFlags)] {
         use vk::MemoryPropertyFlags as Flags;
         const NONE: Flags = Flags::empty();
@@ -153,10 +153,11 @@ impl Buffer {
         let mut values = Vec::<T>::with_capacity(count);
         self.mapped(|mapped| {
             let to = values.as_mut_ptr().cast::<u8>();
-            // SAFETY: `mapped` points to `size` bytes, which nothing else accesses meanwhile, and `to` to room for `bytes`.
+            // SAFETY: `mapped` points to `size` bytes, which nothing else accesses meanwhile, and `to` to memory for
+            // `bytes`.
             unsafe { mapped.copy_to_nonoverlapping(to, bytes) }
         })?;
-        // SAFETY: there is room for them, and every pattern of bits that was copied is one of `T` (`Pod`).
+        // SAFETY: the capacity suffices, and every pattern of bits that was copied is one of `T` (`Pod`).
         unsafe { values.set_len(count) };
         Ok(values)
     }
@@ -325,8 +326,7 @@ impl Drop for Image {
     }
 }
 
-/// `N` command buffers that are recorded anew for every use, and the fence that their submissions
-/// are waited for with.
+/// `N` command buffers that are recorded again for every use, and the fence that signals the end of their submissions.
 pub struct CommandBuffers<const N: usize> {
     pool: vk::CommandPool,
     fence: vk::Fence,
@@ -335,7 +335,7 @@ pub struct CommandBuffers<const N: usize> {
 }
 
 impl<const N: usize> CommandBuffers<N> {
-    /// Command buffers, nothing recorded.
+    /// Allocates the command buffers, with nothing recorded.
     ///
     /// # Errors
     /// If Vulkan fails.

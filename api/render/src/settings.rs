@@ -1,4 +1,4 @@
-//! How a scene is drawn.
+//! The settings with which a scene is drawn.
 
 use gaurast_scene::camera::Model;
 use gaurast_scene::{Camera, MAX_SH_DEGREE};
@@ -7,34 +7,34 @@ use serde::{Deserialize, Serialize};
 use crate::error::RenderError;
 use crate::modes::{Antialiasing, Geometry, Order, Precision};
 
-/// What a draw may save on: the pipeline's state as far as pictures are the better for it.
+/// The pipeline's settings that affect the picture or its cost.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Settings {
-    /// Draw colours with spherical harmonics of at most this degree.
+    /// The highest spherical harmonics degree of colours.
     pub sh_degree: u32,
-    /// A Gaussian counts where its alpha is at least this.
+    /// The least alpha with which a Gaussian contributes to a pixel.
     pub alpha_floor: f32,
-    /// A pixel is finished before its transmittance would fall below this.
+    /// The transmittance below which no Gaussian may take a pixel: the pixel is finished before.
     pub transmittance_floor: f32,
-    /// What Gaussians are sorted by.
+    /// The key by which Gaussians are sorted.
     pub order: Order,
-    /// What Gaussians are.
+    /// The shape of Gaussians.
     pub geometry: Geometry,
-    /// The rasterizer's arithmetic; binary16 is for volumes in another order than the pixels' own.
+    /// The rasterizer's arithmetic. binary16 supports only volumes, in another order than per pixel.
     pub precision: Precision,
-    /// The greatest relative error of the exponential that alpha is made of.
+    /// The greatest relative error of the exponential in alpha.
     pub exponential_error: f32,
-    /// What the contributions that are left out at a pixel may add up to.
+    /// The greatest sum of contributions that may be skipped at a pixel.
     pub contribution_budget: f32,
-    /// What becomes of Gaussians that are smaller than a pixel.
+    /// The treatment of Gaussians that are smaller than a pixel.
     pub antialiasing: Antialiasing,
-    /// Keep depths, too: see [`Frame::depth`](crate::Frame::depth).
+    /// True to write depths, too: see [`Frame::depth`](crate::Frame::depth).
     pub depth: bool,
 }
 
 impl Default for Settings {
-    /// 3DGS's, with all colour there is.
+    /// 3DGS's settings, with the highest degree.
     fn default() -> Self {
         Self {
             sh_degree: MAX_SH_DEGREE,
@@ -52,7 +52,7 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// Checks that the device draws these modes together, as `camera` sees it, and that the camera can be drawn with.
+    /// Checks that the device can combine these modes with `camera`, and that the camera is valid.
     ///
     /// # Errors
     /// [`RenderError::Combination`], or [`RenderError::Camera`].

@@ -1,4 +1,4 @@
-//! What a frame is drawn to, and how it comes to the host.
+//! The images that a frame is drawn to, and the copy to the host.
 
 use std::sync::Arc;
 
@@ -8,19 +8,19 @@ use crate::device::Device;
 use crate::error::RenderError;
 use crate::resource::{Buffer, Image, Memory};
 
-/// The colour attachment's format: what a draw leaves is kept as it is.
+/// The colour attachment's format, which stores a draw's result unchanged.
 pub const COLOR_FORMAT: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
 
 /// The format of the attachment of expected and median depths.
 pub(crate) const DEPTHS_FORMAT: vk::Format = vk::Format::R32G32_SFLOAT;
 
-/// Where a frame goes.
+/// The images and buffers of a frame.
 pub struct Target {
     /// The colour attachment.
     pub image: Image,
-    /// Room for the pixels in memory of the host.
+    /// The buffer in host memory to which the pixels are copied.
     pub readback: Buffer,
-    /// The attachment of depths and the room for them, if there are some.
+    /// The attachment of depths and its buffer, if depths are drawn.
     pub(crate) depths: Option<(Image, Buffer)>,
 }
 
@@ -75,7 +75,7 @@ impl Target {
     }
 }
 
-/// Copies the drawn picture to the buffer that the host reads, and depths if there are some.
+/// Copies the drawn picture, and depths if there are any, to the buffers that the host reads.
 pub fn record_copy(device: &Device, commands: vk::CommandBuffer, target: &Target) {
     copy_image(device, commands, &target.image, &target.readback);
     if let Some((image, readback)) = &target.depths {

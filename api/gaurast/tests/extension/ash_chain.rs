@@ -1,4 +1,4 @@
-//! The extension's structures chain to ash's own, and its command is loaded and called as ash's are.
+//! Tests that the extension's structures chain to ash's own, and that its command is loaded and called as ash's are.
 
 use std::ffi::{CStr, c_char, c_void};
 use std::sync::Mutex;
@@ -72,7 +72,7 @@ fn pipeline_state_chains_with_the_defaults_of_3dgs() {
     assert_eq!(found.transmittance_floor, 1e-4);
 }
 
-/// The calls that the recording function below took: command buffer and the eye of each camera.
+/// The calls of the recording function below: the command buffer and the eye of each camera.
 static CALLED: Mutex<Vec<(u64, [f64; 3])>> = Mutex::new(Vec::new());
 
 unsafe extern "system" fn record_cameras(
@@ -115,7 +115,7 @@ fn the_command_is_loaded_and_called() {
             std::ptr::null()
         }
     };
-    // SAFETY: only `vkGetDeviceProcAddr` is called, which is there.
+    // SAFETY: only `vkGetDeviceProcAddr` is called, which is loaded.
     let instance = unsafe { ash::Instance::load_with(load, vk::Instance::from_raw(1)) };
     // SAFETY: none of the device's core functions is called.
     let device = unsafe { ash::Device::load_with(|_| std::ptr::null(), vk::Device::from_raw(2)) };

@@ -1,5 +1,5 @@
-//! The camera helpers against the matrices that they read: every visible point must come to the
-//! same pixel and depth by the camera's formulas as by view, projection, division and viewport.
+//! Tests of the camera helpers: every visible point must have the same pixel and depth by the camera's formulas as by
+//! view matrix, projection matrix, division and viewport.
 
 use gaurast::camera::{CameraError, widen};
 use gaurast::vk::{GaussianCameraDataGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST};
@@ -31,7 +31,7 @@ fn by_camera(camera: &GaussianCameraGAURAST<'_>, p: DVec3) -> ([f64; 2], f64, f6
     }
 }
 
-/// Pixel and depth as Vulkan gives them to a vertex, from the corner of the viewport's area.
+/// Pixel and depth of a vertex in Vulkan, from the corner of the viewport's area.
 fn by_matrices(view: DMat4, projection: DMat4, viewport: [f32; 2], p: DVec3) -> ([f64; 2], f64) {
     let clip = projection * view * p.extend(1.0);
     let ndc = clip.truncate() / clip.w;
@@ -46,7 +46,7 @@ fn by_matrices(view: DMat4, projection: DMat4, viewport: [f32; 2], p: DVec3) -> 
     )
 }
 
-/// Asserts that camera and matrices agree about points in front of the eye, some off screen.
+/// Asserts that camera and matrices agree for points in front of the eye, some off screen.
 fn assert_agrees(
     camera: &GaussianCameraGAURAST<'_>,
     view: DMat4,
@@ -68,7 +68,7 @@ fn assert_agrees(
             let p = camera_to_world.transform_point3(t);
             let (pixel, depth, z) = by_camera(camera, p);
             let (expected_pixel, expected_depth) = by_matrices(view, projection, viewport, p);
-            // The camera is rounded to binary32; nothing else may differ.
+            // Only the camera's rounding to binary32 may make a difference.
             let scale = f64::from(viewport[0]) * (1.0 + distance);
             for axis in 0..2 {
                 let error = (pixel[axis] - expected_pixel[axis]).abs();

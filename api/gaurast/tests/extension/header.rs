@@ -1,10 +1,10 @@
-//! The C header says what the Rust structures say: sizes, offsets and values, as C11 and as C++17.
+//! Tests that the C header agrees with the Rust structures: sizes, offsets and values, as C11 and as C++17.
 
 use crate::names::{LAYOUT, VALUES};
 use gaurast_runner::Need;
 use std::process::Command;
 
-/// Expressions of C with the values that they must have.
+/// C expressions with their expected values.
 fn expectations() -> impl Iterator<Item = (&'static str, i64)> {
     let layout = LAYOUT.iter().map(|&(name, size)| (name, size as i64));
     layout.chain(VALUES.iter().copied())
@@ -12,7 +12,7 @@ fn expectations() -> impl Iterator<Item = (&'static str, i64)> {
 
 const VULKAN_HEADER: Need = Need::File("/usr/include/vulkan/vulkan.h");
 
-/// Asserts that a file compiles whose static assertions are the expectations.
+/// Asserts that a file compiles, with the expectations as static assertions.
 fn compile(compiler: &str, flags: &[&str], name: &str, assertion: &str) {
     let mut source = String::from("#include <stddef.h>\n#include \"vulkan_gaurast.h\"\n");
     for (expression, value) in expectations() {

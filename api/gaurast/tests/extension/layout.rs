@@ -1,5 +1,5 @@
-//! Structures have the layout of their C declarations, and enums the values of the extension's
-//! block. The numbers are written out, because C programs and layers depend on them.
+//! Tests that structures have the layout of their C declarations, and enums the values of the extension's block. The
+//! numbers are written out, because C programs and layers depend on them.
 
 use std::mem::{align_of, offset_of, size_of};
 

@@ -1,4 +1,4 @@
-//! The extension's structures, its C header, its place beside ash and its camera helpers.
+//! Tests of the extension's structures, its C header, its use with ash, and its camera helpers.
 
 mod ash_chain;
 mod camera;
