@@ -1,7 +1,7 @@
-//! Writes the driver's own extension as `api/` has it, from the extension's fragment of the registry: the Rust of
-//! `gaurast`, the C header, and the names in C with their values in Rust, by which a test holds one against the other.
+//! Writes the files of the driver's own extension in `api/` from its fragment of the registry: the Rust of `gaurast`,
+//! the C header, and the C names with their Rust values, by which a test compares the two.
 //!
-//! A structure has the `Default` that is written by hand among the sources of `gaurast`, or else each member's own.
+//! A structure has the `Default` that is written by hand among the sources of `gaurast`, or else that of each member.
 
 mod comment;
 mod extension;
@@ -50,7 +50,7 @@ pub(crate) fn generate(root: &Path, fragment: &Path) -> Result<Vec<File>, Error>
     ])
 }
 
-/// The types that have a `Default` by hand.
+/// The types whose `Default` is written by hand.
 fn defaults(sources: &Path) -> Result<BTreeSet<String>, Error> {
     let mut found = BTreeSet::new();
     for path in source_files(sources)? {

@@ -1,4 +1,4 @@
-//! Declarations of ash, and of gaurast beside it: the Rust names and types of the registry's things.
+//! Declarations of ash and of gaurast: the Rust names and types of the registry's things.
 
 use crate::error::Error;
 use crate::file::File;
@@ -19,7 +19,7 @@ pub struct Declarations {
 /// A structure as it is declared.
 #[derive(Debug)]
 pub struct Structure {
-    /// Its type, with its path and with an elided lifetime where it has one.
+    /// Its type, with its path, and with an elided lifetime if it has one.
     pub ty: String,
     /// Its members, without `s_type`, `p_next` and the marker of a lifetime.
     pub members: Vec<Member>,
@@ -48,9 +48,8 @@ pub struct Function {
 impl Declarations {
     /// Reads the sources of ash, which `cargo metadata` finds, and the definitions of gaurast, which are given.
     ///
-    /// # Errors
-    /// [`Error::Program`] where cargo doesn't know ash, [`Error::File`] and [`Error::Rust`] where its source isn't as
-    /// expected.
+    /// # Errors [`Error::Program`] if cargo doesn't know ash; [`Error::File`] and [`Error::Rust`] if its source has an
+    /// unexpected form.
     pub fn read(root: &Path, gaurast: &File) -> Result<Self, Error> {
         let ash = ash_folder(root)?.join("src/vk");
         let mut declarations = Self::default();
@@ -205,7 +204,7 @@ fn with_paths(tokens: TokenStream) -> TokenStream {
         let is_colon =
             |token: &TokenTree| matches!(token, TokenTree::Punct(p) if p.as_char() == ':');
         if tokens.next_if(is_colon).is_some() {
-            // The name of a module: the path is given anew.
+            // The name of a module is skipped: a new path replaces it.
             tokens.next_if(is_colon);
         } else {
             text.extend(with_path(&name.to_string()).parse::<TokenStream>());

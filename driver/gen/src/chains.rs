@@ -1,4 +1,4 @@
-//! The structures in which Vulkan asks for features or for properties.
+//! The structures of the `pNext` chains with which applications query features and properties.
 
 use crate::ash::{self, Declarations};
 use crate::error::Error;
@@ -11,16 +11,16 @@ use std::collections::HashSet;
 pub(crate) struct Chained<'a> {
     /// Its name in the registry.
     pub(crate) name: &'a str,
-    /// The registry's words of it.
+    /// Its definition in the registry.
     pub(crate) structure: &'a registry::Structure,
     /// Its declaration, whose members are in the same order.
     pub(crate) declared: &'a ash::Structure,
-    /// The extension that brings it, unless the core version does.
+    /// The extension that adds it; None if the core version does.
     pub(crate) extension: Option<&'a str>,
 }
 
 impl<'a> Chained<'a> {
-    /// A structure of the registry's.
+    /// A structure of the registry with its declaration.
     pub(crate) fn new(
         registry: &'a Registry,
         declarations: &'a Declarations,
@@ -44,8 +44,8 @@ impl<'a> Chained<'a> {
         })
     }
 
-    /// The structures that extend `base`: those of the core version, first those that hold all of a version's, then
-    /// those of listed extensions.
+    /// The structures that extend `base`: those of the core version, beginning with those that hold all of a version's,
+    /// then those of listed extensions.
     pub(crate) fn all(
         registry: &'a Registry,
         declarations: &'a Declarations,

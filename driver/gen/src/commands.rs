@@ -1,14 +1,15 @@
 //! Writes `dispatch/commands.rs`: the functions that Vulkan calls, around the driver's own, and the table of them.
 //!
-//! A function of the driver's takes those of its command's parameters that it wants, by their names without `p_`, or
-//! of the members of the structure that one points at, and each in the form that it declares: the command's own type;
-//! a handle as the object (`&Buffer`, `&Arc<Buffer>`, `Option<&Buffer>`, or, to be destroyed, `Option<Arc<Buffer>>`);
-//! a pointer as what it points at (`&T`, `&mut T`, `Option<&T>`, `&[T]`, `&[Arc<Buffer>]`, `Handles<'_, vk::Buffer>`,
-//! `&CStr`, `&mut [MaybeUninit<T>]`, `OutputChain<'_, T>`, and with its count `Structures<'_, T>`); a `VkBool32` as a
-//! `bool`; a command buffer as its `recorder`; a structure of the chain as `Option<&T>`; and `&Commands`, the table.
-//! An output pointer that it doesn't take is written with what it returns: a value, an `Arc` of an object, or a list.
-//! Of commands that have a second version, which takes a structure of the first one's parameters, the second is
-//! enough. A command that does nothing but set a dynamic state whose value is its parameter needs no function at all.
+//! A function of the driver takes parameters of its command, by their names without `p_`, or members of the structure
+//! that a parameter points at. It takes those that it declares, each in the form that it declares: the command's own
+//! type; a handle as the object (`&Buffer`, `&Arc<Buffer>`, `Option<&Buffer>`, or, to be destroyed,
+//! `Option<Arc<Buffer>>`); a pointer as its target (`&T`, `&mut T`, `Option<&T>`, `&[T]`, `&[Arc<Buffer>]`,
+//! `Handles<'_, vk::Buffer>`, `&CStr`, `&mut [MaybeUninit<T>]`, `OutputChain<'_, T>`, and with its count
+//! `Structures<'_, T>`); a `VkBool32` as a `bool`; a command buffer as its `recorder`; a structure of the chain as
+//! `Option<&T>`; and `&Commands`, the table. An output pointer that it doesn't take receives the value that it returns:
+//! a value, an `Arc` of an object, or a list. If a command has a second version, which takes a structure of the first
+//! one's parameters, a function for the second is enough. A command that only sets a dynamic state whose value is its
+//! parameter needs no function.
 
 use crate::ash::{self, Declarations, Function, Member};
 use crate::dynamic_states;
@@ -26,18 +27,18 @@ struct Row<'a> {
     gate: String,
 }
 
-/// The parts of the file.
+/// The generated parts of the file.
 #[derive(Default)]
 struct Output {
     functions: String,
     /// The names of the functions.
     defined: BTreeSet<String>,
-    /// Scope and gate, and the rows of the table that have them.
+    /// Pairs of scope and availability, each with its rows of the table.
     blocks: Vec<(String, Vec<String>)>,
 }
 
 impl Output {
-    /// The table, laid out, which rustfmt doesn't do within a macro.
+    /// The text of the table, formatted here because rustfmt does not format the arguments of macros.
     fn table(&self) -> String {
         let mut text = "static ROWS: &[Command] = rows! {\n".to_owned();
         for (block, lines) in &self.blocks {
@@ -126,7 +127,7 @@ fn rows<'a>(registry: &'a Registry, support: &'a Support) -> Result<Vec<Row<'a>>
             }
         }
     }
-    // Some commands come with several extensions, of which one is enough.
+    // A command may come with several extensions; one of them is enough.
     let mut extensions: Vec<(&'a str, &str, Vec<String>)> = Vec::new();
     for extension in support
         .extension
@@ -170,7 +171,7 @@ impl Writer<'_> {
             })?;
         let function = self.declarations.function(self.registry, row.name)?;
         let entry_point = names.iter().find_map(|name| self.entry_points.get(*name));
-        // The first of the names that is there.
+        // The name of the command whose function has been written already, if any.
         let known = output
             .defined
             .iter()
@@ -364,7 +365,7 @@ impl Writer<'_> {
         ))
     }
 
-    /// The body of a command that the driver has no function of.
+    /// The body of a command for which the driver has no function.
     fn without_function(
         &self,
         name: &str,
@@ -414,7 +415,7 @@ impl Writer<'_> {
         )))
     }
 
-    /// The body of a command that calls the driver's function of it.
+    /// The body of a command that calls the driver's function for it.
     fn call(
         &self,
         name: &str,
@@ -507,7 +508,7 @@ impl Writer<'_> {
         })
     }
 
-    /// The structure that a command's parameters lie in, and the parameter that points at it.
+    /// The structure with a command's parameters, and the parameter that points at it.
     fn info<'s>(
         &'s self,
         definition: &'s registry::Command,
@@ -525,7 +526,7 @@ impl Writer<'_> {
     }
 }
 
-/// A structure that holds what are parameters of the driver's function.
+/// A structure whose members are parameters of the driver's function.
 struct Info<'a> {
     /// The variable that refers to it.
     variable: &'static str,
@@ -558,8 +559,8 @@ impl<'a> Info<'a> {
         })
     }
 
-    /// A member, or a structure of the chain, in the form that a parameter of the driver's function has; and if that is
-    /// unsafe.
+    /// A member, or a structure of the chain, converted to the form of a parameter of the driver's function; and true
+    /// if the conversion is unsafe.
     fn argument(&self, writer: &Writer<'_>, wanted: &Member) -> Option<(String, bool)> {
         let variable = self.variable;
         let place = |index: usize| format!("{variable}.{}", self.declared.members[index].name);
@@ -618,7 +619,7 @@ fn scope(name: &str, definition: &registry::Command) -> &'static str {
     }
 }
 
-/// A type without spaces, paths and lifetimes, to compare and to take apart.
+/// A type without spaces, paths and lifetimes, to be compared and parsed.
 fn plain(ty: &str) -> String {
     let text: String = ty.split_whitespace().collect();
     text.replace("std::ffi::", "")
@@ -641,7 +642,7 @@ fn list_names(parameters: &[Member]) -> String {
     names.join(", ")
 }
 
-/// The parameter that counts the elements of another.
+/// The parameter with the number of elements of another.
 fn count_of<'a>(
     definition: &registry::Command,
     function: &'a Function,
@@ -654,15 +655,15 @@ fn count_of<'a>(
 
 /// The number of elements of a parameter.
 struct Count {
-    /// The parameter that has it.
+    /// The parameter that contains the number.
     parameter: String,
-    /// It, or the member of it, that is the number.
+    /// The expression for the number: the parameter, or a member of it.
     expression: String,
     /// The number's type.
     ty: String,
 }
 
-/// The number of elements of a parameter: another parameter, or a member of what one points at.
+/// The number of elements of a parameter: another parameter, or a member of the structure that one points at.
 fn count(definition: &registry::Command, function: &Function, index: usize) -> Option<Count> {
     if let Some(count) = count_of(definition, function, index) {
         return Some(Count {
@@ -685,7 +686,7 @@ fn count(definition: &registry::Command, function: &Function, index: usize) -> O
     })
 }
 
-/// A parameter in the form that a function wants; and if that is unsafe.
+/// A parameter converted to the form of the function's parameter; and true if the conversion is unsafe.
 fn convert(wanted: &str, declared: &Member, count: Option<&Count>) -> Option<(String, bool)> {
     let (wanted, raw, name) = (plain(wanted), plain(&declared.ty), &declared.name);
     if wanted == raw {
@@ -755,7 +756,7 @@ fn convert(wanted: &str, declared: &Member, count: Option<&Count>) -> Option<(St
     Some((conversion, true))
 }
 
-/// A parameter as the value of a dynamic state; stencil masks are as wide as stencil texels.
+/// A parameter converted to the value of a dynamic state; stencil masks are as wide as stencil texels.
 fn convert_value(wanted: &str, declared: &Member) -> Option<String> {
     let (ty, raw, name) = (plain(wanted), plain(&declared.ty), &declared.name);
     if raw.strip_prefix("*const") == Some(&ty) {
@@ -770,7 +771,7 @@ fn convert_value(wanted: &str, declared: &Member) -> Option<String> {
     }
 }
 
-/// A call whose result goes where the command's output does; and if that is unsafe.
+/// A call whose result is written to the command's output; and true if that is unsafe.
 fn write_output(
     output: &str,
     function: &Function,
@@ -779,7 +780,7 @@ fn write_output(
 ) -> Option<(String, bool)> {
     let output = plain(output);
     let returned = function.output.as_deref().map(plain);
-    // The body's value as the command's result.
+    // Converts the body's value to the command's result.
     let returns = |body: String, is_result: bool| match (returned.as_deref(), is_result) {
         (Some("Result"), false) => format!("{body}.map(|()| vk::Result::SUCCESS)"),
         (None, true) => format!("{body}.map(drop)"),

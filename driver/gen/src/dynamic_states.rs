@@ -1,4 +1,4 @@
-//! The driver's table of dynamic states, by which commands that do nothing but set one are written.
+//! The driver's table of dynamic states. The generator writes the commands that only set one of them.
 
 use crate::ash::type_text;
 use crate::error::Error;
@@ -18,7 +18,7 @@ const TABLE: &str = "dynamic_states";
 pub(crate) struct Row {
     /// The variant of `DynamicState`.
     pub(crate) variant: String,
-    /// Each face has the state of its own.
+    /// True if each face has a state of its own.
     pub(crate) is_of_face: bool,
     /// The name of the value.
     pub(crate) value: String,

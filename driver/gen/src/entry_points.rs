@@ -1,4 +1,4 @@
-//! The driver's functions of Vulkan commands: those in `driver/src` with a `#[doc(alias = "vkCommand")]`.
+//! The driver's functions for Vulkan commands: those in `driver/src` with a `#[doc(alias = "vkCommand")]`.
 
 use crate::ash::{Member, type_text};
 use crate::error::Error;
@@ -14,7 +14,7 @@ const FOLDER: &str = "driver/src";
 pub(crate) struct EntryPoint {
     /// Its path within the driver.
     pub(crate) path: String,
-    /// It is unsafe to call.
+    /// True if it is unsafe to call.
     pub(crate) is_unsafe: bool,
     /// Its parameters.
     pub(crate) parameters: Vec<Member>,
@@ -22,10 +22,9 @@ pub(crate) struct EntryPoint {
     pub(crate) output: String,
 }
 
-/// Finds all functions by the names of their commands.
+/// Finds all functions, by the names of their commands.
 ///
-/// # Errors
-/// [`Error::EntryPoint`] where two have one command.
+/// # Errors [`Error::EntryPoint`] if two functions have the same command.
 pub(crate) fn find(root: &Path) -> Result<BTreeMap<String, EntryPoint>, Error> {
     let folder = root.join(FOLDER);
     let mut found = BTreeMap::new();
@@ -58,14 +57,14 @@ fn module(path: &Path) -> String {
     format!("crate::{}", names.join("::"))
 }
 
-/// The commands that a function says it is.
+/// The commands in a function's `doc(alias)` attributes.
 fn commands(function: &syn::ItemFn) -> Vec<String> {
     let mut commands = Vec::new();
     for attribute in &function.attrs {
         if !attribute.path().is_ident("doc") {
             continue;
         }
-        // Other documentation isn't a list, and is of no concern here.
+        // Other documentation isn't a list and is ignored.
         let _ = attribute.parse_nested_meta(|meta| {
             if meta.path.is_ident("alias") {
                 commands.push(meta.value()?.parse::<syn::LitStr>()?.value());

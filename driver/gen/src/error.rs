@@ -1,8 +1,8 @@
-//! Errors of generation. Each names what has to be changed.
+//! Errors of generation. Each names what has to be changed to fix it.
 
 use std::path::PathBuf;
 
-/// A reason why nothing is generated.
+/// The reason that no files are generated.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// A file can't be read or written.
@@ -28,10 +28,10 @@ pub enum Error {
         path: PathBuf,
         /// Its checksum.
         found: String,
-        /// The version and checksum that are wanted.
+        /// The version and checksum that are expected.
         expected: String,
     },
-    /// A registry that is no valid one.
+    /// The registry is invalid.
     #[error("{path}: {reason}")]
     Registry {
         /// The file.
@@ -39,7 +39,7 @@ pub enum Error {
         /// The fault.
         reason: String,
     },
-    /// Rust that can't be parsed.
+    /// Rust source can't be parsed.
     #[error("{path}: {source}")]
     Rust {
         /// The file.
@@ -47,16 +47,16 @@ pub enum Error {
         /// The fault.
         source: syn::Error,
     },
-    /// A `support.toml` that can't be parsed.
+    /// `support.toml` can't be parsed.
     #[error("driver/support.toml: {0}")]
     SupportSyntax(#[from] toml::de::Error),
-    /// A `support.toml` that contradicts the registry.
+    /// `support.toml` contradicts the registry.
     #[error("driver/support.toml: {0}")]
     Support(String),
-    /// An entry point that contradicts the registry.
+    /// An entry point contradicts the registry.
     #[error("driver/src: {0}")]
     EntryPoint(String),
-    /// A thing of the registry that ash or gaurast doesn't declare.
+    /// Neither ash nor gaurast declares a thing of the registry.
     #[error("ash declares no {0}")]
     Undeclared(String),
 }

@@ -13,7 +13,7 @@ pub(crate) fn write(registry: &Registry, support: &Support) -> Result<String, Er
             .filter_map(|name| registry.extension(name))
             .filter(|extension| extension.is_of_instance == is_of_instance)
             .collect();
-        // The driver's own come first.
+        // The driver's own extensions come first.
         extensions.sort_by_key(|extension| !extension.name.starts_with("VK_GAURAST"));
         extensions
             .into_iter()

@@ -1,4 +1,4 @@
-//! Files that are generated.
+//! Generated files.
 
 /// A generated file.
 #[derive(Debug)]

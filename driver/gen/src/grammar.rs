@@ -15,7 +15,7 @@ const VERSION: &str = "1.4.335";
 /// The SHA-256 of that version's `spirv.core.grammar.json`.
 const SHA256: &str = "2768cbed9533c61dc9fe06e3a85b0c3533352a8c5f3d627302fb2678db880f71";
 
-/// The machine-readable grammar, as far as it is read.
+/// The parts of the machine-readable grammar that are used.
 #[derive(Deserialize)]
 struct Grammar {
     instructions: Vec<Instruction>,
@@ -32,7 +32,7 @@ struct Instruction {
 #[derive(Deserialize)]
 struct Operand {
     kind: String,
-    /// `?` for an operand that may be missing, `*` for one that may be there any number of times.
+    /// `?` for an optional operand, `*` for one that may occur any number of times.
     #[serde(default)]
     quantifier: String,
 }
@@ -66,8 +66,7 @@ impl Enumerant {
 
 /// Generates the table of SPIR-V's grammar from `spirv.core.grammar.json`.
 ///
-/// # Errors
-/// [`Error::OtherRegistry`], and what reading and parsing may fail with.
+/// # Errors [`Error::OtherRegistry`], and the errors of reading and parsing.
 pub fn generate(json: &Path) -> Result<File, Error> {
     let text = registry::read_version(json, VERSION, SHA256)?;
     let grammar: Grammar = serde_json::from_str(&text).map_err(|error| Error::Registry {
@@ -207,7 +206,7 @@ fn values(enumerations: &[&OperandKind]) -> String {
     })
 }
 
-/// The arms of operations, those of equal operands together.
+/// The match arms of operations. Operations with equal operands share an arm.
 fn operations(instructions: &[Instruction]) -> String {
     let mut arms: BTreeMap<String, Vec<Op>> = BTreeMap::new();
     let mut seen = BTreeSet::new();
@@ -229,7 +228,7 @@ fn operations(instructions: &[Instruction]) -> String {
         })
 }
 
-/// An arm of a match, in lines that aren't too long: rustfmt would give each pattern a line.
+/// A match arm in lines of limited length: rustfmt would give each pattern a line.
 fn arm(operations: &[Op], operands: &str) -> String {
     const WIDTH: usize = 116;
     let mut text = String::new();
@@ -251,7 +250,7 @@ fn arm(operations: &[Op], operands: &str) -> String {
     text
 }
 
-/// A call that makes the operands of an operation.
+/// An expression for the operands of an operation.
 fn row(operands: &[Operand]) -> String {
     let list = |quantifier| {
         let kinds = operands.iter().filter(|it| it.quantifier == quantifier);
@@ -265,7 +264,7 @@ fn row(operands: &[Operand]) -> String {
     format!("o(&[{}], &[{}], {repeated})", list(""), list("?"))
 }
 
-/// The arms of enumerations some of whose enumerants have parameters.
+/// The match arms of enumerations with enumerants that have parameters.
 fn parameters(enumerations: &[&OperandKind]) -> String {
     let mut text = String::new();
     for enumeration in enumerations {
@@ -304,7 +303,7 @@ fn parameters(enumerations: &[&OperandKind]) -> String {
     text
 }
 
-/// A pattern for a value that has parameters: its name, or the bit of a mask.
+/// The pattern for a value with parameters: its name, or the bit of a mask.
 fn pattern(enumeration: &str, value: u32) -> String {
     match enumeration {
         "Decoration" => Decoration::from_u32(value).map(|it| format!("Decoration::{it:?}")),

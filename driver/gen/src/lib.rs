@@ -1,11 +1,11 @@
 //! Writes the driver's Rust from the Vulkan registry and from SPIR-V's grammar.
 //!
-//! It reads `vk.xml`, the fragment of the driver's own extension, and
-//! `driver/support.toml`, which says what of it the driver supports, and writes the files of `driver/src/registry` and
-//! the dispatch table. From the fragment alone it writes the extension as `api/` has it, in Rust and in C. From the
-//! machine-readable grammar of SPIR-V it writes the table that modules are decoded by. All are checked in, so that
-//! building the driver needs neither this crate nor the files that `driver/gen/fetch.sh` gets. What Vulkan's things are
-//! called in Rust it learns from the sources of ash.
+//! It reads `vk.xml`, the fragment of the driver's own extension, and `driver/support.toml`, which lists what the
+//! driver supports, and writes the files of `driver/src/registry` and the dispatch table. From the fragment alone it
+//! writes the extension's files in `api/`, in Rust and in C. From the machine-readable grammar of SPIR-V it writes the
+//! table with which modules are decoded. All generated files are checked in, so that building the driver needs neither
+//! this crate nor the files that `driver/gen/fetch.sh` downloads. The sources of ash give the Rust names of Vulkan's
+//! things.
 
 mod api;
 mod ash;

@@ -12,13 +12,13 @@ use std::fmt::Write;
 /// The core structure, whose members are properties.
 const CORE: &str = "VkPhysicalDeviceProperties";
 
-/// The members of the core structure that are structures of properties.
+/// The members of the core structure that are themselves structures of properties.
 const NESTED: [(&str, &str); 2] = [
     ("limits", "VkPhysicalDeviceLimits"),
     ("sparse_properties", "VkPhysicalDeviceSparseProperties"),
 ];
 
-/// Members that have another name in the structure that holds all of a version's.
+/// Members that have another name in the structure that holds all properties of a version.
 const RENAMED: [(&str, &str, &str); 3] = [
     (
         "VkPhysicalDeviceSubgroupProperties",
@@ -67,7 +67,7 @@ pub(crate) fn field<'a>(structure: &str, member: &'a str) -> &'a str {
         .map_or(member, |(_, _, to)| to)
 }
 
-/// Adds a structure's properties to those that are there, under each name once.
+/// Adds a structure's properties, each name once.
 fn add<'a>(all: &mut Vec<Property<'a>>, chained: &Chained<'a>) -> Result<(), Error> {
     for (member, declared) in chained.members() {
         let field = field(chained.name, &declared.name);

@@ -1,4 +1,4 @@
-//! The registry: what `vk.xml` and the extension's own fragment say, as far as the driver is concerned.
+//! The registry: the parts of `vk.xml` and of the extension's own fragment that the driver needs.
 
 use crate::error::Error;
 use sha2::{Digest, Sha256};
@@ -20,24 +20,24 @@ const SHA256: &str = "b6444639bee1102c9af8356299cefd09985b5bf8505f1d5dbe93d5c656
 pub struct Registry {
     /// Structures by name.
     pub structures: HashMap<String, Structure>,
-    /// The names of types by other names of theirs.
+    /// Names of types by their aliases.
     type_aliases: HashMap<String, String>,
     /// Commands by name.
     pub commands: HashMap<String, Command>,
-    /// The names of commands by other names of theirs.
+    /// Names of commands by their aliases.
     command_aliases: HashMap<String, String>,
     /// The requirements of core versions, in the registry's order.
     pub versions: Vec<Requirement<Version>>,
     /// The requirements of extensions, in the registry's order.
     pub extensions: Vec<Extension>,
-    /// SPIR-V's capabilities and what enables each.
+    /// SPIR-V's capabilities, and the conditions that enable each.
     pub capabilities: Vec<(String, Vec<vk_parse::Enable>)>,
 }
 
 /// A structure.
 #[derive(Clone, Debug)]
 pub struct Structure {
-    /// The structures whose chains it may stand in.
+    /// The structures whose `pNext` chains may contain it.
     pub extends: Vec<String>,
     /// Its members, without `sType` and `pNext`.
     pub members: Vec<Member>,
@@ -48,7 +48,7 @@ pub struct Structure {
 pub struct Member {
     /// Its name.
     pub name: String,
-    /// The member that counts its elements, or an expression; `None` where it is no array.
+    /// The member with the number of elements, or an expression; `None` if it is not an array.
     pub len: Option<String>,
 }
 
@@ -66,7 +66,7 @@ pub struct Parameter {
     pub name: String,
     /// The type that its declaration names.
     pub ty: String,
-    /// The parameter that counts its elements, or an expression; `None` where it is no array.
+    /// The parameter with the number of elements, or an expression; `None` if it is not an array.
     pub len: Option<String>,
 }
 
@@ -76,7 +76,7 @@ pub type Version = (u32, u32);
 /// A requirement of a core version or an extension, under a condition.
 #[derive(Debug)]
 pub struct Requirement<T> {
-    /// Who requires it.
+    /// The core version or extension.
     pub by: T,
     /// The condition, as an expression over versions, extensions and features.
     pub depends: Option<String>,
@@ -93,7 +93,7 @@ pub struct Requirement<T> {
 pub struct Extension {
     /// Its name.
     pub name: String,
-    /// It is enabled for an instance, not for a device.
+    /// True if it is enabled for an instance, not for a device.
     pub is_of_instance: bool,
     /// The version of its specification.
     pub spec_version: u32,
@@ -108,8 +108,7 @@ pub struct Extension {
 impl Registry {
     /// Reads `vk.xml`, which must be of [`VERSION`], and the extension's fragment.
     ///
-    /// # Errors
-    /// [`Error::OtherRegistry`], and what reading and parsing may fail with.
+    /// # Errors [`Error::OtherRegistry`], and the errors of reading and parsing.
     pub fn read(vk_xml: &Path, fragment: &Path) -> Result<Self, Error> {
         read_version(vk_xml, VERSION, SHA256)?;
         let mut registry = Self::default();
@@ -186,21 +185,21 @@ impl Registry {
         }
     }
 
-    /// The name that a type was given last, under which it is defined.
+    /// The newest name of a type, under which it is defined.
     pub fn type_name<'a>(&'a self, name: &'a str) -> &'a str {
         self.type_aliases
             .get(name)
             .map_or(name, |alias| self.type_name(alias))
     }
 
-    /// The name that a command was given last, under which it is defined.
+    /// The newest name of a command, under which it is defined.
     pub fn command_name<'a>(&'a self, name: &'a str) -> &'a str {
         self.command_aliases
             .get(name)
             .map_or(name, |alias| self.command_name(alias))
     }
 
-    /// All names of a type, of which one is given.
+    /// All names of a type, given one of them.
     pub fn type_names<'a>(&'a self, name: &'a str) -> Vec<&'a str> {
         let last = self.type_name(name);
         let mut names: Vec<&str> = self
@@ -214,7 +213,7 @@ impl Registry {
         names
     }
 
-    /// All names of a command, of which one is given.
+    /// All names of a command, given one of them.
     pub fn command_names<'a>(&'a self, name: &'a str) -> Vec<&'a str> {
         let last = self.command_name(name);
         let mut names: Vec<&str> = self
@@ -228,7 +227,7 @@ impl Registry {
         names
     }
 
-    /// The extension of a name.
+    /// The extension with a name.
     pub fn extension(&self, name: &str) -> Option<&Extension> {
         self.extensions.iter().find(|e| e.name == name)
     }
@@ -276,7 +275,7 @@ pub(crate) fn read(path: &Path) -> Result<String, Error> {
     })
 }
 
-/// Tells if a list of APIs holds Vulkan; without a list, a thing is of all.
+/// Reports whether a list of APIs contains Vulkan; without a list, a thing belongs to all APIs.
 fn is_of_vulkan(apis: Option<&str>) -> bool {
     apis.is_none_or(|apis| apis.split(',').any(|api| api == "vulkan"))
 }
@@ -435,7 +434,7 @@ fn operand(rest: &mut &str, is_there: &dyn Fn(&str) -> bool) -> bool {
     is_there(name)
 }
 
-/// Sorts what a core version requires by version.
+/// Sorts the requirements of core versions by version.
 pub fn by_version<T>(
     requirements: &[Requirement<Version>],
     newest: Version,

@@ -12,7 +12,7 @@ use std::fmt::Write;
 use std::str::FromStr;
 use vk_parse::Enable;
 
-/// The part of the driver that a capability may be enabled by.
+/// The part of the driver's support that may enable a capability.
 struct Known<'a> {
     registry: &'a Registry,
     declarations: &'a Declarations,
@@ -34,7 +34,7 @@ pub(crate) fn write(
         properties: properties::structures(registry, declarations, support)?,
     };
     let mut arms = String::new();
-    // Some names are other names of the same capability.
+    // A capability may have several names.
     let mut seen = BTreeSet::new();
     for (name, enables) in &registry.capabilities {
         let Ok(capability) = Capability::from_str(name) else {
@@ -47,7 +47,7 @@ pub(crate) fn write(
         for enable in enables {
             match known.enable(enable)? {
                 Some(row) => rows.push(row),
-                // The core version is enough.
+                // The core version enables it.
                 None => {
                     rows.clear();
                     break;
@@ -97,7 +97,7 @@ pub(crate) fn write(
 }
 
 impl Known<'_> {
-    /// A row of what enables a capability; `None` where nothing is needed.
+    /// The expression for a condition that enables a capability; `None` if it always holds.
     fn enable(&self, enable: &Enable) -> Result<Option<String>, Error> {
         Ok(match enable {
             Enable::Version(name) if self.support.has(name) => None,

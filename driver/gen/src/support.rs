@@ -1,4 +1,4 @@
-//! The things that the driver supports: `driver/support.toml`.
+//! The features and extensions that the driver supports, read from `driver/support.toml`.
 
 use crate::error::Error;
 use crate::registry::{self, Registry, Version};
@@ -10,19 +10,19 @@ use std::path::Path;
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Support {
-    /// The things that the core version brings.
+    /// The features of the core version.
     pub core: Core,
-    /// The extensions that are listed.
+    /// The listed extensions.
     pub extension: BTreeMap<String, Listed>,
     /// SPIR-V's capabilities.
     pub spirv: Spirv,
-    /// Commands of which the driver has no function.
+    /// Commands for which the driver has no function.
     pub commands: Commands,
-    /// Promoted extensions that are not, and why.
+    /// Promoted extensions that are not supported, with the reasons.
     pub absent: BTreeMap<String, String>,
 }
 
-/// The things that the core version brings.
+/// The features of the core version.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Core {
@@ -30,7 +30,7 @@ pub struct Core {
     pub version: String,
     /// The features that work, by their names in the registry.
     pub features: Vec<String>,
-    /// The features that the version makes mandatory and that don't work, and why.
+    /// Features that the version makes mandatory and that don't work, with the reasons.
     #[serde(default)]
     pub missing: BTreeMap<String, String>,
 }
@@ -39,25 +39,25 @@ pub struct Core {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Spirv {
-    /// Capabilities that work although the extension that brings them isn't listed.
+    /// Capabilities that work although their extension isn't listed.
     pub accepted: Vec<String>,
 }
 
-/// Commands of which the driver has no function.
+/// Commands for which the driver has no function.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Commands {
-    /// Commands that fail, and why.
+    /// Commands that fail, with the reasons.
     pub refused: BTreeMap<String, String>,
-    /// Commands that rightly do nothing, and why.
+    /// Commands that rightly do nothing, with the reasons.
     pub no_op: BTreeMap<String, String>,
 }
 
-/// An extension that is listed.
+/// An extension in the list.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Listed {
-    /// The features of its own that work.
+    /// The extension's features that work.
     #[serde(default)]
     pub features: Features,
 }
@@ -66,9 +66,9 @@ pub struct Listed {
 #[derive(Debug, Deserialize)]
 #[serde(untagged)]
 pub enum Features {
-    /// These.
+    /// The features with these names.
     Some(Vec<String>),
-    /// `"all"` of them.
+    /// All features: the text `"all"`.
     All(String),
 }
 
@@ -89,15 +89,14 @@ impl Support {
 
     /// The core version.
     ///
-    /// # Errors
-    /// [`Error::Support`] if it is none.
+    /// # Errors [`Error::Support`] if the text is not a version.
     pub fn version(&self) -> Result<Version, Error> {
         registry::version(&self.core.version)
             .ok_or_else(|| Error::Support(format!("{} is no version", self.core.version)))
     }
 
-    /// Tells if a name in a condition of the registry's is there: a core version, an extension, or a feature as
-    /// `Structure::member`.
+    /// Reports whether a name in one of the registry's conditions is supported: a core version, an extension, or a
+    /// feature as `Structure::member`.
     pub fn has(&self, name: &str) -> bool {
         if let Some((_, feature)) = name.split_once("::") {
             return self.core.features.iter().any(|f| f == feature);
@@ -108,17 +107,16 @@ impl Support {
         }
     }
 
-    /// Tells if a condition of the registry's holds; none always does.
+    /// Reports whether a condition of the registry holds. No condition always holds.
     pub fn meets(&self, condition: Option<&str>) -> bool {
         condition.is_none_or(|condition| registry::holds(condition, &|name| self.has(name)))
     }
 
     /// Checks that the file agrees with the registry.
     ///
-    /// # Errors
-    /// [`Error::Support`] names the first extension that isn't known, lacks what it depends on, or was promoted to core
-    /// and is neither listed nor absent with a reason, or the first mandatory feature that is neither there nor missing
-    /// with a reason.
+    /// # Errors [`Error::Support`] names the first extension that is unknown, lacks a dependency, or was promoted to
+    /// core and is neither listed nor absent with a reason; or the first mandatory feature that is neither supported
+    /// nor missing with a reason.
     pub fn check(&self, registry: &Registry) -> Result<(), Error> {
         let wrong = |text: String| Err(Error::Support(text));
         for name in self.extension.keys().chain(self.absent.keys()) {

@@ -1,4 +1,4 @@
-//! The ids of valid usage that the driver's messages name are those of Vulkan's specification, or of the extension's own.
+//! Tests that the ids of valid usage in the driver's messages are in Vulkan's specification, or the extension's own.
 
 use gaurast_runner::Need;
 use registry_gen::repository;
@@ -12,7 +12,7 @@ fn main() -> std::process::ExitCode {
 /// The ids of Vulkan's specification, as Debian's package of the headers has them.
 const VALID_USAGE: &str = "/usr/share/vulkan/registry/validusage.json";
 
-/// The ids that Vulkan 1.3.239 lacks, which the package has, and that 1.3.281 has.
+/// Ids that the package's version, Vulkan 1.3.239, lacks, and that 1.3.281 has.
 const NEWER: [&str; 9] = [
     "VUID-RuntimeSpirv-OpEntryPoint-08743",
     "VUID-VkComputePipelineCreateInfo-layout-07988",
@@ -35,7 +35,7 @@ fn ids(text: &str, found: &mut BTreeSet<String>) {
     }
 }
 
-/// Collects the ids in the files of a folder and of those in it.
+/// Collects the ids in the files of a folder and its subfolders.
 fn ids_of_folder(folder: &Path) -> BTreeSet<String> {
     let mut found = BTreeSet::new();
     let mut folders = vec![folder.to_owned()];
@@ -60,7 +60,7 @@ fn messages_name_rules_that_there_are() {
     assert!(known.len() > 10_000, "{} ids", known.len());
 
     let named = ids_of_folder(&repository().join("driver/src"));
-    // A command's name is put into these, which the next test holds.
+    // A command's name is inserted into these ids; the next test checks them.
     let is_whole = |id: &&String| !matches!(id.as_str(), "VUID-" | "VUID--");
     let unknown: Vec<_> = named
         .iter()
@@ -73,7 +73,7 @@ fn messages_name_rules_that_there_are() {
     }
 }
 
-/// The rules that are named with the name of the command that is recorded.
+/// Tests the ids that are completed with the name of the recorded command.
 #[gaurast_runner::test(needs = [Need::File(VALID_USAGE)])]
 fn every_recorded_command_must_be_in_a_recording() {
     let text = std::fs::read_to_string(VALID_USAGE).expect("a file that was just looked at");
@@ -86,7 +86,7 @@ fn every_recorded_command_must_be_in_a_recording() {
         .split("guard(command_buffer,\"vkCmd")
         .skip(1)
         .filter_map(|rest| rest.split_once('"'))
-        // The extension's text leaves implicit valid usage out, as that of others is generated.
+        // The extension's text leaves out implicit valid usage, because that is generated.
         .filter(|(name, _)| !name.ends_with("GAURAST"));
     let mut count = 0;
     for (name, _) in names {

@@ -1,4 +1,4 @@
-//! The generated files are what the generator writes.
+//! Tests that the checked-in files equal the generator's output.
 
 use gaurast_runner::Need;
 use registry_gen::{File, generate, generate_grammar, repository};

@@ -1,7 +1,7 @@
 //! `libvulkan_gaurast.so`: the three symbols by which the Vulkan loader finds the driver, and a logger.
 //!
-//! The loader's "Architecture of the Vulkan Loader Interfaces" says what each symbol must do. `GAURAST_LOG` says what is
-//! logged.
+//! The loader's document "Architecture of the Vulkan Loader Interfaces" specifies each symbol. `GAURAST_LOG` sets what
+//! is logged.
 
 use std::ffi::{CStr, c_char};
 use std::mem::transmute;
@@ -18,7 +18,7 @@ use driver::loader;
 pub unsafe extern "system" fn vk_icdNegotiateLoaderICDInterfaceVersion(
     version: *mut u32,
 ) -> vk::Result {
-    // The loader's process has no other logger; if it does have one, that one stays.
+    // A process usually has no other logger; if it has one, that one stays.
     let environment = env_logger::Env::new().filter_or("GAURAST_LOG", "warn");
     let _ = env_logger::Builder::from_env(environment).try_init();
     // The loader negotiates before it asks for any extension.

@@ -1,4 +1,4 @@
-//! From words to instructions, by the grammar. The words may be anything.
+//! Decodes words to instructions by the grammar. It accepts any words.
 
 use std::collections::HashMap;
 
@@ -11,10 +11,9 @@ use super::instruction::{Instruction, Operand};
 /// The words before the first instruction.
 pub(crate) const HEADER_WORDS: usize = 5;
 
-/// Decodes the instructions of a module, in order, and gives each to `each`.
+/// Decodes the instructions of a module, in order, and passes each to `each`.
 ///
-/// # Errors
-/// [`Error::Binary`] names the first word that isn't as the grammar says, and what `each` fails with.
+/// # Errors [`Error::Binary`] names the first word that violates the grammar. An error of `each` is returned.
 pub(crate) fn decode(
     words: &[u32],
     mut each: impl FnMut(Instruction) -> Result<(), Error>,
@@ -59,7 +58,7 @@ fn invalid<T>(word: usize, reason: impl std::fmt::Display) -> Result<T, Error> {
     })
 }
 
-/// The bits of a literal of a type, or of the type of a value.
+/// The number of bits of a literal of a type, or of a value's type.
 fn literal_width(it: &Instruction, widths: &HashMap<u32, u32>) -> Option<u32> {
     match it.opcode {
         Op::TypeInt | Op::TypeFloat => it.number(0).ok(),
@@ -73,7 +72,7 @@ struct Decoder<'a> {
     words: &'a [u32],
     /// The next word.
     at: usize,
-    /// Bits of literals by the ids of types and values.
+    /// The number of bits of literals, by the ids of types and values.
     literal_widths: &'a HashMap<u32, u32>,
     it: Instruction,
 }
@@ -160,7 +159,7 @@ impl Decoder<'_> {
         Ok(())
     }
 
-    /// A literal of a type, or of the type of a value; of one word if that isn't known.
+    /// Decodes a literal of a type, or of a value's type; one word if that is unknown.
     fn typed_literal(&mut self, of: Option<u32>) -> Result<(), Error> {
         match of.and_then(|id| self.literal_widths.get(&id)) {
             None | Some(8 | 16 | 32) => self.literal(),
@@ -174,7 +173,7 @@ impl Decoder<'_> {
         }
     }
 
-    /// A string of UTF-8, to the word with its zero byte.
+    /// Decodes a string of UTF-8, up to the word with its zero byte.
     fn string(&mut self) -> Result<(), Error> {
         let mut bytes = Vec::new();
         loop {
@@ -192,7 +191,7 @@ impl Decoder<'_> {
         Ok(())
     }
 
-    /// A value of an enumeration and its parameters; a mask, and the parameters of its bits.
+    /// Decodes a value of an enumeration and its parameters, or a mask and the parameters of its bits.
     fn enumerant(&mut self, enumeration: Kind) -> Result<(), Error> {
         let value = self.word()?;
         if !enumeration.has(value) {
@@ -251,7 +250,7 @@ mod tests {
             Operand::Enumerant(6),
         ];
         assert_eq!(all[2].operands, built_in);
-        // The alignment that a bit of the mask asks for.
+        // The alignment that a bit of the mask requires.
         let aligned = [Operand::Id(8), Operand::Enumerant(2), Operand::Literal(16)];
         assert_eq!(all[3].operands, aligned);
     }

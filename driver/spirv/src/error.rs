@@ -1,4 +1,4 @@
-//! Why a shader can't be used: the instruction and the reason.
+//! The reason that a shader can't be used, and the instruction.
 
 use isa::validate::InvalidProgram;
 use spirv::Op;
@@ -6,12 +6,12 @@ use thiserror::Error;
 
 use super::Stage;
 
-/// An instruction in which a problem was found.
+/// The instruction in which a problem was found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InstructionRef {
     /// The instruction's name.
     pub opcode: Op,
-    /// The id that it defines, or, if it defines none, the first id that it names.
+    /// The id that it defines; if it defines none, its first id operand.
     pub id: Option<u32>,
 }
 
@@ -25,7 +25,7 @@ impl std::fmt::Display for InstructionRef {
     }
 }
 
-/// Why a shader module, or an entry point of it, can't be used.
+/// The reason that a shader module, or an entry point of it, can't be used.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum Error {
     /// The words aren't a SPIR-V module that can be decoded.
@@ -42,18 +42,18 @@ pub enum Error {
         /// The fault.
         reason: String,
     },
-    /// An instruction asks for something that this driver doesn't do.
+    /// An instruction needs something that this driver doesn't support.
     #[error("unsupported SPIR-V: {place}: {reason}")]
     Unsupported {
         /// The instruction.
         place: InstructionRef,
-        /// The thing that it asks for.
+        /// The unsupported thing.
         reason: String,
     },
-    /// The module, or what comes of it, is too big.
+    /// The module, or its translation, is too big.
     #[error("shader too large: {what} exceed {limit}")]
     TooLarge {
-        /// The thing that there is too much of.
+        /// The thing that is too big.
         what: &'static str,
         /// The most that is allowed.
         limit: u64,
@@ -71,12 +71,12 @@ pub enum Error {
     Specialization {
         /// The constant's `SpecId`.
         id: u32,
-        /// Bytes it takes.
+        /// The constant's size in bytes.
         expected: usize,
-        /// Bytes it was given.
+        /// The value's size in bytes.
         given: usize,
     },
-    /// The system gave no thread to translate on.
+    /// The system could not start a thread for the translation.
     #[error("there is no thread to translate on: {reason}")]
     NoThread {
         /// The system's message.
@@ -87,7 +87,7 @@ pub enum Error {
     Program(#[from] InvalidProgram),
 }
 
-/// A problem whose place isn't known yet.
+/// A problem whose instruction isn't known yet.
 #[derive(Clone, Debug)]
 pub(crate) enum Diagnostic {
     /// See [`Error::Malformed`].
@@ -101,18 +101,18 @@ pub(crate) enum Diagnostic {
 /// The result of translating a part of a shader.
 pub(crate) type Result<T, E = Diagnostic> = std::result::Result<T, E>;
 
-/// A diagnostic: SPIR-V's rules are broken.
+/// The diagnostic of a violation of SPIR-V's rules.
 pub(crate) fn malformed<T>(reason: impl Into<String>) -> Result<T> {
     Err(Diagnostic::Malformed(reason.into()))
 }
 
-/// A diagnostic: this driver can't do it.
+/// The diagnostic of something that this driver doesn't support.
 pub(crate) fn unsupported<T>(reason: impl Into<String>) -> Result<T> {
     Err(Diagnostic::Unsupported(reason.into()))
 }
 
 impl Diagnostic {
-    /// Says which instruction it was, unless that is known already.
+    /// Adds the instruction, unless it is known already.
     pub(crate) fn locate(self, place: InstructionRef) -> Error {
         match self {
             Self::Malformed(reason) => Error::Malformed { place, reason },

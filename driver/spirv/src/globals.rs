@@ -21,12 +21,12 @@ pub struct Specialization {
 }
 
 impl Specialization {
-    /// Gives the constant with this `SpecId` a value: the bytes of its type; four for a boolean.
+    /// Sets the value of the constant with this `SpecId`: the bytes of its type; four for a boolean.
     pub fn set(&mut self, id: u32, bytes: &[u8]) {
         self.values.insert(id, bytes.to_vec());
     }
 
-    /// The bits given to a constant that takes some bytes; None if it keeps its default.
+    /// The bits given to a constant of `expected` bytes; None if it keeps its default.
     fn bits(&self, id: u32, expected: usize) -> Result<Option<u64>, Error> {
         let Some(bytes) = self.values.get(&id) else {
             return Ok(None);
@@ -44,7 +44,7 @@ impl Specialization {
     }
 }
 
-/// A constant: a bit pattern for each scalar, as registers hold them.
+/// A constant: a bit pattern for each scalar, in the form of registers.
 #[derive(Clone, Debug)]
 pub(crate) struct Constant {
     pub ty: u32,
@@ -59,19 +59,19 @@ pub(crate) struct GlobalVariable {
     pub initializer: Option<u32>,
 }
 
-/// All that stands before the functions of a module.
+/// All declarations before the functions of a module.
 #[derive(Debug, Default)]
 pub(crate) struct Globals {
     pub types: Types,
     pub constants: HashMap<u32, Constant>,
     pub variables: HashMap<u32, GlobalVariable>,
-    /// Types of the undefined ids that aren't values: images, samplers and pointers.
+    /// Types of undefined ids that aren't values: images, samplers and pointers.
     pub undefined: HashMap<u32, u32>,
     scalars: usize,
 }
 
 impl Globals {
-    /// Reads them, in order.
+    /// Reads the declarations, in order.
     pub fn new(module: &Module, specialization: &Specialization) -> Result<Self, Error> {
         let mut globals = Self::default();
         for instruction in &module.sections.globals {
@@ -315,7 +315,7 @@ fn from_memory(scalar: Scalar, bits: u64) -> u64 {
     }
 }
 
-/// Cuts an integer to its width and extends it by its own signedness to its register.
+/// Truncates an integer to its width and extends it by its own signedness to a register.
 fn wrap_to_width(scalar: Scalar, bits: u64) -> u64 {
     match scalar {
         Scalar::Int {
@@ -350,7 +350,7 @@ fn number(scalar: Scalar, bits: u64) -> Number {
     }
 }
 
-/// An integer, read both ways.
+/// An integer, as signed and as unsigned.
 #[derive(Clone, Copy)]
 struct Number {
     width: u32,
@@ -443,7 +443,7 @@ fn evaluate(globals: &Globals, ty: u32, words: &[u32]) -> Result<Vec<u64>> {
         .collect()
 }
 
-/// The part of a composite that a path of indices leads to: its type and the scalars before it.
+/// The part of a composite at a path of indices: its type and the number of scalars before it.
 fn path(globals: &Globals, mut ty: u32, indices: &[u32]) -> Result<(u32, usize)> {
     let mut start = 0;
     for index in indices {

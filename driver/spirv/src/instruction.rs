@@ -4,7 +4,7 @@ use spirv::Op;
 
 use super::error::{InstructionRef, Result, malformed};
 
-/// An operand: what its words are, by the grammar.
+/// An operand: the meaning of its words by the grammar.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Operand {
     /// An id.
@@ -15,7 +15,7 @@ pub(crate) enum Operand {
     Literal64(u64),
     /// A string.
     String(String),
-    /// A value of an enumeration, or a mask. The grammar has it; its parameters are the operands that follow.
+    /// A value of an enumeration, or a mask, as in the grammar. Its parameters are the operands that follow.
     Enumerant(u32),
 }
 
@@ -29,7 +29,7 @@ impl Operand {
     }
 }
 
-/// An instruction, with operands as the grammar asks for them.
+/// An instruction, with operands as the grammar defines them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Instruction {
     pub opcode: Op,
@@ -101,7 +101,7 @@ impl Instruction {
         }
     }
 
-    /// The instruction as errors name it.
+    /// The reference by which errors name the instruction.
     pub fn reference(&self) -> InstructionRef {
         let named = || self.operands.iter().find_map(Operand::id);
         InstructionRef {

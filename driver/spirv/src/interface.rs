@@ -76,7 +76,7 @@ pub enum BuiltIn {
     NumWorkgroups,
 }
 
-/// The way in which a fragment input follows from the values at the vertices.
+/// The interpolation of a fragment input between the vertices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Interpolation {
     /// Perspective-correct.
@@ -107,9 +107,9 @@ pub enum InputSource {
         location: u32,
         /// The component, in units of 32 bits.
         component: u32,
-        /// Fragment stage only.
+        /// The interpolation; fragment stage only.
         interpolation: Interpolation,
-        /// Fragment stage only.
+        /// The sampling point; fragment stage only.
         sampling: Sampling,
     },
     /// A component, or an element, of a built-in.
@@ -195,14 +195,14 @@ pub struct ShaderBinding {
     pub kind: DescriptorKind,
     /// The array's length, or 1.
     pub count: u32,
-    /// The program's resource slot of the first; the others follow. Resource slots are unique over all kinds; a combined
-    /// image sampler uses the same for both.
+    /// The program's resource slot of the first descriptor; the others follow. Resource slots are unique over all
+    /// kinds; a combined image sampler uses the same slot for both.
     pub slot: u32,
     /// Buffers: the least size in bytes that covers all members but a runtime array.
     pub size: u64,
-    /// The program may write to it.
+    /// True if the program may write to it.
     pub writable: bool,
-    /// Images: which.
+    /// The image, for image descriptors.
     pub image: Option<ImageUse>,
     /// Input attachments: the index of the attachment.
     pub attachment: Option<u32>,
@@ -213,16 +213,16 @@ pub struct ShaderBinding {
 /// A fragment shader's promise about the depth that it writes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum DepthMode {
-    /// It writes none.
+    /// It writes no depth.
     #[default]
     NotWritten,
-    /// Any depth.
+    /// The depth may have any value.
     Replacing,
-    /// At least the primitive's.
+    /// The depth is at least the primitive's.
     Greater,
-    /// At most the primitive's.
+    /// The depth is at most the primitive's.
     Less,
-    /// The primitive's. A depth that breaks this promise is written all the same.
+    /// The depth is the primitive's. A depth that breaks this promise is written all the same.
     Unchanged,
 }
 
@@ -241,17 +241,17 @@ pub struct Interface {
     pub push_constants: Option<Range<u32>>,
     /// Compute: invocations of a workgroup in x, y and z; 1 otherwise.
     pub workgroup_size: [u32; 3],
-    /// Fragment: depth and stencil are tested before the shader.
+    /// Fragment: true if depth and stencil are tested before the shader.
     pub early_fragment_tests: bool,
-    /// Fragment: the depth that it writes.
+    /// Fragment: the promise about the depth that it writes.
     pub depth: DepthMode,
-    /// Fragment: it may kill or demote.
+    /// Fragment: true if it may kill or demote.
     pub discards: bool,
-    /// Fragment: it must run for each sample.
+    /// Fragment: true if it must run for each sample.
     pub per_sample: bool,
-    /// It stores to buffers or images, or uses atomics: it can't be skipped.
+    /// True if it stores to buffers or images, or uses atomics, so that it can't be skipped.
     pub has_side_effects: bool,
-    /// It reaches memory by device addresses.
+    /// True if it accesses memory by device addresses.
     pub uses_addresses: bool,
 }
 

@@ -1,11 +1,11 @@
 //! The shader compiler's front end: a SPIR-V module is decoded, and its entry points are translated to programs of the
-//! device's shader cores, each with an [`Interface`] that says what the program exchanges with the outside.
+//! device's shader cores. An [`Interface`] describes the inputs, outputs and resources of a program.
 //!
-//! [`Module::parse`] when a shader module is created; [`translate`] for each stage when a pipeline is created, with its
-//! specialization constants.
+//! [`Module::parse`] is called when a shader module is created, and [`translate`] for each stage when a pipeline is
+//! created, with its specialization constants.
 //!
-//! The words of a module may be anything: what is malformed or unsupported is an [`Error`] that names the instruction,
-//! in bounded time and memory, never a panic.
+//! A module may have any words: a malformed or unsupported one gives an [`Error`] that names the instruction, in
+//! bounded time and memory, never a panic.
 
 mod decoder;
 mod error;

@@ -20,12 +20,12 @@ struct Decorated {
     parameters: Vec<Operand>,
 }
 
-/// The extended instructions that an import gives.
+/// The set of extended instructions that an import names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ExtendedSet {
     /// `GLSL.std.450`.
     Glsl,
-    /// `NonSemantic.*` and debug information: nothing to do.
+    /// `NonSemantic.*` and debug information, which are ignored.
     NonSemantic,
     /// Any other.
     Unknown,
@@ -46,7 +46,7 @@ pub(crate) struct Function {
     pub blocks: Vec<Block>,
 }
 
-/// The instructions of a module, those that matter, by what they are.
+/// The relevant instructions of a module, by their section.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Sections {
     pub capabilities: Vec<Instruction>,
@@ -61,7 +61,7 @@ pub(crate) struct Sections {
     pub functions: Vec<Function>,
 }
 
-/// Puts instructions where they belong.
+/// Sorts instructions into sections and functions.
 #[derive(Default)]
 struct Loader {
     sections: Sections,
@@ -178,7 +178,7 @@ fn invalid<T>(reason: impl Into<String>) -> Result<T, Error> {
     })
 }
 
-/// A shader module: decoded, indexed, but not yet checked beyond that.
+/// A shader module: decoded and indexed, but not checked beyond that.
 #[derive(Debug)]
 pub struct Module {
     pub(crate) sections: Sections,
@@ -222,7 +222,7 @@ impl Module {
         self.version
     }
 
-    /// The name that debug information gives an id.
+    /// The name of an id in debug information.
     pub fn name(&self, id: u32) -> Option<&str> {
         self.names.get(&id).map(String::as_str)
     }
@@ -245,7 +245,7 @@ impl Module {
         declared.any(|it| it.enumerant(0, Capability::from_u32) == Some(capability))
     }
 
-    /// Tells if an id is decorated so.
+    /// Reports whether an id has a decoration.
     pub(crate) fn has(&self, id: u32, decoration: Decoration) -> bool {
         self.decorations
             .get(&id)
@@ -262,7 +262,7 @@ impl Module {
         built_in(self.decorations.get(&id)?)
     }
 
-    /// Tells if a struct's member is decorated so.
+    /// Reports whether a struct's member has a decoration.
     pub(crate) fn member_has(&self, id: u32, member: u32, decoration: Decoration) -> bool {
         self.member_decorations
             .get(&(id, member))
@@ -337,7 +337,7 @@ impl Module {
         Ok(())
     }
 
-    /// Decorates each target as the group is; returns how many decorations that were, stopping at `limit`.
+    /// Decorates each target of a group. Returns the number of added decorations; stops at `limit`.
     fn apply_group(&mut self, operands: &[Operand], limit: usize) -> usize {
         let Some(group) = operands.first().and_then(Operand::id) else {
             return 0;

@@ -1,4 +1,4 @@
-//! SPIR-V's types as the translation sees them: each value type is a flat run of scalars.
+//! SPIR-V's types in the form of the translation: each value type is a sequence of scalars.
 
 use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
@@ -42,7 +42,7 @@ impl Scalar {
         }
     }
 
-    /// Bits of the scalar; 0 for a truth value, which has none.
+    /// The number of bits of the scalar; 0 for a truth value.
     pub fn bits(self) -> u32 {
         match self {
             Self::Bool => 0,
@@ -65,7 +65,7 @@ impl Scalar {
         }
     }
 
-    /// Tells if it takes 64 bits.
+    /// Reports whether it takes 64 bits.
     pub fn is_wide(self) -> bool {
         matches!(
             self,
@@ -105,7 +105,7 @@ impl Scalar {
 #[derive(Clone, Debug)]
 pub(crate) struct Member {
     pub ty: u32,
-    /// Scalars before it.
+    /// The number of scalars before it.
     pub start: u32,
     /// Bytes before it, if the struct has an explicit layout.
     pub offset: Option<u32>,
@@ -187,7 +187,7 @@ pub(crate) enum Type {
     Function,
 }
 
-/// The scalars of a pointer as a value; there are none if pointers of the storage class are no values.
+/// The scalars of a pointer as a value; empty if pointers of the storage class are not values.
 pub(crate) fn pointer_scalars(class: StorageClass) -> &'static [Scalar] {
     const WORD: Scalar = Scalar::Int {
         width: 32,
@@ -195,9 +195,9 @@ pub(crate) fn pointer_scalars(class: StorageClass) -> &'static [Scalar] {
     };
     match class {
         StorageClass::PhysicalStorageBuffer => &[Scalar::Address],
-        // A descriptor's slot and bytes from its start; the slot is counted from 1, and 0 in the null pointer.
+        // The slot of a descriptor and the bytes from its start. Slots are counted from 1; 0 means the null pointer.
         StorageClass::StorageBuffer => &[WORD, WORD],
-        // Bytes from the start of workgroup memory, counted from 1; 0 is the null pointer.
+        // The bytes from the start of workgroup memory, counted from 1; 0 means the null pointer.
         StorageClass::Workgroup => &[WORD],
         _ => &[],
     }
@@ -206,7 +206,7 @@ pub(crate) fn pointer_scalars(class: StorageClass) -> &'static [Scalar] {
 #[derive(Clone, Debug)]
 struct Entry {
     ty: Type,
-    /// Scalars of a value; None if it can't be a value.
+    /// The number of scalars of a value; None if it can't be a value.
     scalars: Option<u32>,
     depth: u32,
 }
@@ -215,13 +215,13 @@ struct Entry {
 #[derive(Debug, Default)]
 pub(crate) struct Types {
     entries: HashMap<u32, Entry>,
-    /// Pointers announced, not declared yet.
+    /// Pointers that are announced but not declared.
     forward: HashSet<u32>,
-    /// The layout that members of a matrix type have, where all have the same.
+    /// The layout of the members of a matrix type, if they all have the same.
     matrix_layouts: HashMap<u32, Option<MatrixLayout>>,
 }
 
-/// The layout of a matrix: bytes from one column (or row) to the next, and whether it is from row to row.
+/// The layout of a matrix: the bytes from one column (or row) to the next, and true if it is from row to row.
 pub(crate) type MatrixLayout = (u32, bool);
 
 impl Types {
@@ -236,7 +236,7 @@ impl Types {
 
     /// Declares a type whose parts are declared already.
     pub fn declare(&mut self, id: u32, ty: Type) -> Result<()> {
-        // Sizes of types are kept, so what they were made of must not change.
+        // Sizes of types are cached, so the types of their parts must not change.
         let announced = matches!(
             ty,
             Type::Pointer { class: StorageClass::PhysicalStorageBuffer, pointee } if pointee != 0
@@ -305,7 +305,7 @@ impl Types {
         }
     }
 
-    /// The matrix type that a type is, or is an array of.
+    /// The matrix type that a type is, or that it is an array of.
     pub fn matrix_in(&self, mut id: u32) -> Option<u32> {
         loop {
             match self.get(id).ok()? {
@@ -388,7 +388,7 @@ impl Types {
         Ok(())
     }
 
-    /// The scalar of a scalar or vector type, and how many there are.
+    /// The scalar of a scalar or vector type, and the number of components.
     pub fn vector(&self, id: u32) -> Result<(Scalar, u32)> {
         match self.get(id)? {
             Type::Scalar(scalar) => Ok((*scalar, 1)),
@@ -432,7 +432,7 @@ impl Types {
         if index >= count {
             return malformed(format!("index {index} is beyond the end of %{id}"));
         }
-        // The product is less than the scalars of the whole, where that is a value.
+        // The product is less than the number of scalars of the whole, if that is a value.
         match self.scalars(element)?.checked_mul(index) {
             Some(start) => Ok((element, start)),
             None => unsupported(format!("%{id} is too large")),

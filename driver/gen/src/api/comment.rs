@@ -1,13 +1,14 @@
 //! Documentation in Rust from the registry's comments.
 //!
-//! A comment names things in backticks, as C has them: `VkGaussianOrderGAURAST`, `VK_GAUSSIAN_ORDER_PER_PIXEL_GAURAST`,
-//! `VkGaussianCameraGAURAST::eye`, and members of the structure that it is about. In Rust these are links.
+//! A comment names things in backticks, with their C names: `VkGaussianOrderGAURAST`,
+//! `VK_GAUSSIAN_ORDER_PER_PIXEL_GAURAST`, `VkGaussianCameraGAURAST::eye`, and members of the structure that it
+//! describes. In Rust these are links.
 
 use super::extension::{Extension, Structure, TAG, rust_constant, rust_name};
 use crate::rust::snake_case;
 use std::fmt::Write;
 
-/// The greatest number of letters of a line's text.
+/// The most characters of text in a line.
 const WIDTH: usize = 92;
 
 /// The comments of an extension.
@@ -19,7 +20,7 @@ pub(super) struct Comments<'a> {
 }
 
 impl Comments<'_> {
-    /// The documentation of a thing with a name in C, and the name as its alias.
+    /// The documentation of a thing with a C name, with the name as its alias.
     pub(super) fn item(&self, name: &str, comment: &str, of: Option<&Structure>) -> String {
         let text = if comment.trim().is_empty() {
             format!("/// `{name}`.\n")
@@ -29,7 +30,7 @@ impl Comments<'_> {
         format!("{text}#[doc(alias = \"{name}\")]\n")
     }
 
-    /// A comment as documentation; its paragraphs are parted by empty lines.
+    /// A comment as documentation. Empty lines separate its paragraphs.
     pub(super) fn text(&self, comment: &str, of: Option<&Structure>) -> String {
         let mut text = String::new();
         let lines: Vec<&str> = comment.trim().lines().map(str::trim).collect();
@@ -51,7 +52,7 @@ impl Comments<'_> {
         text
     }
 
-    /// A paragraph whose names in backticks are those of Rust.
+    /// A paragraph whose names in backticks are replaced by links to the Rust names.
     fn links(&self, paragraph: &str, of: Option<&Structure>) -> String {
         let mut text = String::new();
         for (index, part) in paragraph.split('`').enumerate() {

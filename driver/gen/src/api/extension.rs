@@ -1,4 +1,4 @@
-//! The extension, as its fragment of the registry says.
+//! The extension, as its fragment of the registry describes it.
 
 use crate::error::Error;
 use crate::registry;
@@ -20,7 +20,7 @@ pub(super) struct Extension {
     pub(super) revision: String,
     /// Constants that belong to no type, with their types and values in C.
     pub(super) constants: Vec<Constant>,
-    /// The values that it adds to enums of Vulkan's.
+    /// The values that it adds to enums of Vulkan.
     pub(super) added: Vec<Added>,
     /// Its enums and flags.
     pub(super) enums: Vec<Enum>,
@@ -36,11 +36,11 @@ pub(super) struct Constant {
     pub(super) comment: String,
 }
 
-/// A value of an enum of Vulkan's.
+/// A value that the extension adds to an enum of Vulkan.
 #[derive(Debug)]
 pub(super) struct Added {
     pub(super) name: String,
-    /// The enum that it is of.
+    /// The enum to which it is added.
     pub(super) of: String,
     pub(super) value: i64,
     pub(super) comment: String,
@@ -49,7 +49,7 @@ pub(super) struct Added {
 /// An enum, or flags.
 #[derive(Debug)]
 pub(super) struct Enum {
-    /// Its name; that of the bits, if it is one of flags.
+    /// Its name; for flags, the name of the bits.
     pub(super) name: String,
     pub(super) is_flags: bool,
     pub(super) values: Vec<Value>,
@@ -70,7 +70,7 @@ pub(super) struct Structure {
     pub(super) name: String,
     /// The name of its `sType`'s value, if it has one.
     pub(super) structure_type: Option<String>,
-    /// The structures whose chains it may stand in.
+    /// The structures whose `pNext` chains may contain it.
     pub(super) extends: Vec<String>,
     pub(super) members: Vec<Member>,
     pub(super) comment: String,
@@ -86,7 +86,7 @@ pub(super) struct Member {
     pub(super) is_pointer: bool,
     /// The lengths of an array, the outermost first.
     pub(super) lengths: Vec<u32>,
-    /// The parameter that counts what a parameter points at, if it is an array.
+    /// The parameter with the number of elements, if the parameter is an array.
     pub(super) counted_by: Option<String>,
     pub(super) comment: String,
 }
@@ -100,12 +100,12 @@ pub(super) struct Command {
 }
 
 impl Enum {
-    /// The name of its type: that of the flags for bits.
+    /// The name of the type: for bits, that of the flags.
     pub(super) fn type_name(&self) -> String {
         self.name.replace("FlagBits", "Flags")
     }
 
-    /// The words that its values' names begin with.
+    /// The prefix of its values' names.
     pub(super) fn prefix(&self) -> String {
         let name = self.name.trim_end_matches(TAG).replace("FlagBits", "");
         snake_case(&name).to_uppercase()
@@ -125,12 +125,12 @@ pub(super) fn rust_name(name: &str) -> &str {
     name.strip_prefix("Vk").unwrap_or(name)
 }
 
-/// The name of a constant or a value in Rust, where it stands in no type.
+/// The Rust name of a constant, or of a value outside a type.
 pub(super) fn rust_constant(name: &str) -> &str {
     name.strip_prefix("VK_").unwrap_or(name)
 }
 
-/// A file of Rust that is made of the fragment alone.
+/// A Rust file that is generated from the fragment alone.
 pub(super) fn rust_file(documentation: &str, code: &str) -> Result<String, Error> {
     file_of("api/spec/vk_gaurast.xml", documentation, code)
 }
@@ -250,7 +250,7 @@ impl Extension {
         (!self.revision.is_empty()).then_some(())
     }
 
-    /// The name in C that the names of its macros begin with.
+    /// The prefix of the names of its C macros.
     pub(super) fn macro_name(&self) -> String {
         self.name.to_uppercase()
     }

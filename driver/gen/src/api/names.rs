@@ -1,4 +1,4 @@
-//! Writes what the C header must say of the Rust, as expressions of C with their values.
+//! Writes the facts that the C header must share with the Rust, as C expressions with their values.
 
 use super::extension::{Extension, Structure, rust_constant, rust_file, rust_name};
 use crate::error::Error;

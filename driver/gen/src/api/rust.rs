@@ -1,4 +1,4 @@
-//! Writes the extension in Rust, in the shape in which ash has the extensions that it knows.
+//! Writes the extension in Rust, in the form of the extensions that ash contains.
 
 use super::comment::Comments;
 use super::extension::{
@@ -22,7 +22,7 @@ fn grouped(number: i64) -> String {
     text
 }
 
-/// A scalar or a name of C's as a type of Rust's.
+/// The Rust type of a C scalar or a C name.
 fn base_type(name: &str) -> String {
     match name {
         "void" => "c_void".to_owned(),
@@ -127,7 +127,7 @@ fn add_enum(code: &mut String, comments: Comments<'_>, of: &Enum) {
             value.value
         );
     }
-    // rustfmt leaves the arguments of macros as they are.
+    // rustfmt does not format the arguments of macros.
     let _ = writeln!(
         code,
         "{kind}! {{\n{}    pub struct {} {{\n{values}    }}\n}}\n",

@@ -1,5 +1,5 @@
-//! Analysis of functions before they are translated: calls among them, the variables that they store to, and those that
-//! are indexed at run time.
+//! Analysis of functions before they are translated: their calls, the variables that they store to, and those that are
+//! indexed at run time.
 
 use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
@@ -13,7 +13,7 @@ use crate::instruction::Instruction;
 use crate::module::{Function, Module};
 use crate::types::Type;
 
-/// The most calls within one another.
+/// The greatest depth of nested calls.
 const MAX_CALL_DEPTH: usize = 64;
 /// The most parameters of a function, SPIR-V's own limit.
 const MAX_PARAMETERS: usize = 255;
@@ -23,12 +23,12 @@ const MAX_SELECTED_ELEMENTS: u32 = 4;
 /// Facts about the functions that an entry point reaches.
 #[derive(Debug, Default)]
 pub struct Analysis {
-    /// Variables (and pointer parameters) that must live in memory.
+    /// Variables (and pointer parameters) that must be in memory.
     pub in_memory: HashSet<u32>,
     /// Variables outside functions that are named anywhere.
     pub used: HashSet<u32>,
     trees: HashMap<usize, Rc<Tree>>,
-    /// The variable or parameter that a pointer leads to.
+    /// The variable or parameter to which a pointer points.
     roots: HashMap<u32, u32>,
     /// Arguments given to each pointer parameter.
     arguments: HashMap<u32, Vec<u32>>,
@@ -37,7 +37,7 @@ pub struct Analysis {
 }
 
 impl Analysis {
-    /// Looks at a function and all that it calls.
+    /// Analyses a function and all that it calls.
     pub fn new(module: &Module, globals: &Globals, entry: usize) -> Result<Self, Error> {
         let mut analysis = Self::default();
         analysis
@@ -175,7 +175,7 @@ impl Analysis {
         Some(globals.types.pointer(*ty).ok()?.1)
     }
 
-    /// Variables whose pointers are given to parameters that live in memory live there too.
+    /// Moves to memory the variables whose pointers are passed to parameters in memory.
     fn spread_memory(&mut self) {
         let mut waiting: Vec<u32> = self.in_memory.iter().copied().collect();
         while let Some(parameter) = waiting.pop() {
@@ -239,7 +239,7 @@ impl Analysis {
     }
 }
 
-/// Tells if a chain of indices picks an element of a long array at run time.
+/// Reports whether a chain of indices selects an element of a long array at run time.
 fn indexes_array(globals: &Globals, mut ty: u32, indices: &[u32]) -> bool {
     for index in indices {
         let constant = globals.constant_u32(*index);

@@ -31,7 +31,7 @@ fn atomic_op(op: Op) -> Result<AtomicOp> {
     })
 }
 
-/// Atomic instructions.
+/// Translates atomic instructions.
 pub fn atomic(t: &mut Translator, it: &Instruction) -> Result<()> {
     let pointer = t.pointer(it.id(0)?)?;
     match it.opcode {

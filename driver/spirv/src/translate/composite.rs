@@ -1,4 +1,4 @@
-//! Composites, taken apart and put together; products of vectors and matrices, determinants and inverses.
+//! Composites, extracted and constructed; products of vectors and matrices, determinants and inverses.
 
 use std::rc::Rc;
 
@@ -48,7 +48,7 @@ impl Matrix {
     }
 }
 
-/// Composite instructions.
+/// Translates composite instructions.
 pub fn composite(t: &mut Translator, it: &Instruction) -> Result<()> {
     match it.opcode {
         Op::CompositeConstruct => {
@@ -91,7 +91,7 @@ pub fn composite(t: &mut Translator, it: &Instruction) -> Result<()> {
             for index in it.numbers(2).into_iter().take(4) {
                 let both = a.iter().chain(b.iter()).copied();
                 let picked = both.clone().nth(index as usize);
-                // All ones stands for an undefined component.
+                // All ones means an undefined component.
                 match picked.or(both.clone().next().filter(|_| index == u32::MAX)) {
                     Some(reg) => regs.push(reg),
                     None => return malformed(format!("there is no component {index}")),
@@ -133,7 +133,7 @@ pub fn composite(t: &mut Translator, it: &Instruction) -> Result<()> {
     }
 }
 
-/// The part that a path of indices leads to: the scalars before it and those in it.
+/// The part at a path of indices: the number of scalars before it and in it.
 fn part(t: &Translator, mut ty: u32, indices: &[u32]) -> Result<(usize, usize)> {
     let mut start = 0;
     for index in indices {
@@ -154,7 +154,7 @@ pub fn matrix(t: &mut Translator, id: u32) -> Result<Matrix> {
     })
 }
 
-/// `OpDot` and products with matrices.
+/// Translates `OpDot` and products with matrices.
 pub fn linear_algebra(t: &mut Translator, it: &Instruction) -> Result<()> {
     let contract = !t.module.has(it.result()?, Decoration::NoContraction);
     let (first, second) = (it.id(0)?, it.id(1)?);
@@ -260,7 +260,7 @@ fn cross_product(t: &mut Translator, scalar: Scalar, [a, b, c, d]: [Reg; 4]) -> 
     t.emit.minus(scalar, left, right)
 }
 
-/// The determinant of the rows and columns that are left of a square matrix.
+/// The determinant of the remaining rows and columns of a square matrix.
 fn minor(
     t: &mut Translator,
     scalar: Scalar,
@@ -300,7 +300,7 @@ fn minor(
     }
 }
 
-/// The precision that a matrix of scalars is decomposed in: halves are rounded once, at the end.
+/// The precision in which the scalars of a matrix are computed: halves are rounded once, at the end.
 fn working_precision(scalar: Scalar) -> Scalar {
     match scalar {
         Scalar::Float { width: 16 } => Scalar::Float { width: 32 },

@@ -1,8 +1,8 @@
-//! Walks a function's tree: constructs, the places where control flow comes together, phis and calls.
+//! Walks a function's tree: constructs, the places where control flow joins, phis and calls.
 //!
-//! At a [merge point](MergePoint) that several edges reach, each variable that the construct stores to gets
-//! variables of the IR, which every edge assigns; so do phis. If only one edge reaches it, what the edge brought is
-//! what the variables are.
+//! At a [merge point](MergePoint) that several edges reach, each variable that the construct stores to gets variables
+//! of the IR, which every edge assigns; so do phis. If only one edge reaches it, the variables keep the registers that
+//! they have at that edge.
 
 use std::collections::{HashMap, VecDeque};
 use std::rc::Rc;
@@ -21,7 +21,7 @@ use crate::error::{Diagnostic, Error, Result, malformed, unsupported};
 use crate::instruction::Instruction;
 use crate::module::Block;
 
-/// Instructions that inlining a function counts for, even if it is empty: nested calls multiply.
+/// The instructions that an inlined function counts for at least. It bounds nested calls of empty functions.
 const CALL_COST: usize = 16;
 
 /// A function being inlined.
@@ -32,7 +32,7 @@ struct Call {
     labels: HashMap<Construct, Label>,
     /// The scope that early returns leave.
     scope: Option<Label>,
-    /// The merge of all returns: variables, and the value returned.
+    /// The merge of all returns: its variables, and the returned value.
     returns: MergeVariables,
     result: Option<Rc<[Reg]>>,
     /// Variables of the IR for the value, if several blocks return.
@@ -42,33 +42,33 @@ struct Call {
 /// A merge point while its construct is open.
 #[derive(Clone, Default)]
 struct MergeVariables {
-    /// The variables concerned, each with the registers that the edges assign, or that the one edge brought.
+    /// The variables, each with the registers that the edges assign, or the registers at the only edge.
     variables: Vec<(usize, Rc<[Option<Reg>]>)>,
     assigns: bool,
 }
 
-/// A switch's selector and, for each case, the values that lead there.
+/// A switch's selector and, for each case, the values that select it.
 struct WordSelector {
     reg: Reg,
     values: Vec<Vec<u32>>,
 }
 
-/// Registers that held the variables that a construct stores to, before it.
+/// The registers, before a construct, of the variables that it stores to.
 type Saved = Vec<(usize, Vec<Option<Reg>>)>;
 
 /// Walks an entry point's function and those that it calls.
 pub struct ControlFlow<'a> {
     pub t: Translator<'a>,
-    /// IR variables of phis.
+    /// The IR variables of phis.
     phis: HashMap<u32, Rc<[Reg]>>,
     /// Functions being inlined, innermost last.
     calls: Vec<Call>,
-    /// Lists of nodes around the one being translated.
+    /// The nesting depth of the node being translated.
     depth: usize,
 }
 
 impl<'a> ControlFlow<'a> {
-    /// Control flow of a translation that begins.
+    /// The state at the beginning of a translation.
     pub fn new(t: Translator<'a>) -> Self {
         Self {
             t,
@@ -95,7 +95,7 @@ impl<'a> ControlFlow<'a> {
         variables::assign_outputs(&mut self.t).map_err(locate)
     }
 
-    /// `OpFunctionCall`.
+    /// Translates `OpFunctionCall`.
     fn call(&mut self, it: &Instruction) -> Result<()> {
         let Some(function) = self.t.module.functions.get(&it.id(0)?).copied() else {
             return malformed("there is no such function");
@@ -129,7 +129,7 @@ impl<'a> ControlFlow<'a> {
         }
     }
 
-    /// Translates a function's body here; returns what it returns.
+    /// Translates a function's body in place. Returns the returned value.
     fn inline(&mut self, function: usize) -> Result<Option<Rc<[Reg]>>> {
         let Some(tree) = self.t.analysis.tree(function) else {
             return malformed("the function isn't structured");
@@ -195,7 +195,7 @@ impl<'a> ControlFlow<'a> {
     }
 
     fn emit_nodes(&mut self, nodes: &[Node]) -> Result<()> {
-        // Constructs of inlined functions add up.
+        // The nesting of inlined functions adds up.
         if self.depth >= MAX_NESTING {
             return unsupported("constructs are nested too deeply");
         }
@@ -294,7 +294,7 @@ impl<'a> ControlFlow<'a> {
                     self.t.emit.builder.break_to(scope);
                 }
             }
-            // Never reached; if it is all the same, nothing may follow.
+            // Never reached; if it is, nothing may follow.
             _ => self.t.emit.builder.ret(),
         }
         Ok(())
@@ -350,7 +350,7 @@ impl<'a> ControlFlow<'a> {
             .reg(*condition)
             .map_err(|diagnostic| diagnostic.locate(terminator.reference()))?;
         match self.t.emit.known(condition) {
-            // Specialization may decide a branch.
+            // A specialization constant may decide a branch.
             Some(0) => self.emit_nodes(otherwise),
             Some(_) => self.emit_nodes(then),
             None => {
@@ -468,7 +468,7 @@ impl<'a> ControlFlow<'a> {
         self.end_merge_point(Some(*merge))
     }
 
-    /// A branch: assigns phis and variables, then leaves if it must.
+    /// Translates a branch: assigns phis and variables, then leaves the construct if necessary.
     fn emit_edge(&mut self, edge: &Edge) -> Result<()> {
         let pairs = self.phi_pairs(edge)?;
         match edge.merge_point {
@@ -490,7 +490,7 @@ impl<'a> ControlFlow<'a> {
         Ok(())
     }
 
-    /// Makes variables of the IR for a function's phis.
+    /// Creates variables of the IR for a function's phis.
     fn declare_phis(&mut self, function: usize) -> Result<()> {
         let blocks = &self.t.module.sections.functions[function].blocks;
         for it in blocks.iter().flat_map(|block| &block.instructions) {
@@ -590,7 +590,7 @@ impl<'a> ControlFlow<'a> {
         Ok(())
     }
 
-    /// An edge reaches a merge point: assigns its variables (and these pairs) at once.
+    /// Assigns the variables of a merge point, and these pairs, in parallel, at an edge that reaches it.
     fn assign_at_merge(
         &mut self,
         merge: &mut MergeVariables,
@@ -623,7 +623,7 @@ impl<'a> ControlFlow<'a> {
         parallel_copy(&mut self.t.emit, pairs)
     }
 
-    /// From here on, variables are what the edges to the merge point made them.
+    /// After the merge point, variables have the values that the edges assigned.
     fn end_merge(&mut self, merge: &MergeVariables) {
         for (variable, regs) in &merge.variables {
             self.t.promoted.variables[*variable].now = regs.to_vec();
@@ -659,7 +659,7 @@ impl<'a> ControlFlow<'a> {
     }
 }
 
-/// Assignments at once: every source is read before any destination is written.
+/// Parallel assignments: every source is read before any destination is written.
 fn parallel_copy(emit: &mut Emitter, mut pairs: Vec<(Reg, Reg)>) -> Result<()> {
     pairs.retain(|(dst, src)| dst != src);
     emit.charge_budget(pairs.len())?;
@@ -696,7 +696,7 @@ fn parallel_copy(emit: &mut Emitter, mut pairs: Vec<(Reg, Reg)>) -> Result<()> {
                 }
             }
         }
-        // What is left are cycles: hold one register's old value for its readers.
+        // Only cycles are left: a copy keeps one register's old value for its readers.
         while next_cycle < pairs.len() && done[next_cycle] {
             next_cycle += 1;
         }

@@ -13,7 +13,7 @@ use crate::types::{ImageType, Type};
 /// The most descriptors that a shader may be bound to.
 const MAX_DESCRIPTORS: u32 = 1 << 24;
 
-/// Gives a descriptor variable its resource slots.
+/// Assigns resource slots to a descriptor variable.
 pub fn descriptor(t: &mut Translator, id: u32, variable: GlobalVariable) -> Result<Binding> {
     let count = descriptor_count(t, variable.pointee)?;
     let slot = t.next_resource_slot;
@@ -60,7 +60,7 @@ pub fn descriptor(t: &mut Translator, id: u32, variable: GlobalVariable) -> Resu
     })
 }
 
-/// A block without an instance name is known by its type's name.
+/// The name of a descriptor variable; that of its type for a block without an instance name.
 fn descriptor_name(t: &Translator, id: u32, ty: u32) -> Option<String> {
     let name = t.module.name(id).or_else(|| t.module.name(ty));
     name.map(str::to_owned)
@@ -155,7 +155,7 @@ pub fn resource(
     })
 }
 
-/// Notes that a place may be written.
+/// Records that a place in memory may be written.
 pub fn mark_written(t: &mut Translator, place: &MemoryRef) {
     match place.space {
         Space::Buffer(binding) => mark_binding_written(t, binding),
@@ -164,7 +164,7 @@ pub fn mark_written(t: &mut Translator, place: &MemoryRef) {
     }
 }
 
-/// Notes that a descriptor's memory may be written; that of a variable pointer may be any storage buffer's.
+/// Records that a descriptor's memory may be written. A variable pointer may point to any storage buffer.
 pub fn mark_binding_written(t: &mut Translator, binding: Binding) {
     t.interface.has_side_effects = true;
     let end = binding.slot + binding.count;

@@ -14,10 +14,10 @@ use crate::error::{Result, malformed, unsupported};
 use crate::instruction::Instruction;
 use crate::types::Scalar;
 
-/// The way in which narrow integers are extended before an operation.
+/// The extension of narrow integers before an operation.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Extension {
-    /// As they are: by their own type's signedness.
+    /// By their own type's signedness, as they are in registers.
     Own,
     Sign,
     Zero,
@@ -26,16 +26,16 @@ enum Extension {
 /// An operation of the IR on each component.
 #[derive(Clone, Copy)]
 struct Elementwise {
-    /// On registers of 32 bits, and on truth values.
+    /// The operation on registers of 32 bits, and on truth values.
     narrow: Ir,
-    /// On registers of 64 bits.
+    /// The operation on registers of 64 bits.
     wide: Ir,
     extension: Extension,
-    /// The second operand comes first.
+    /// True if the second operand comes first.
     exchange: bool,
-    /// The truth value that results is negated.
+    /// True if the resulting truth value is negated.
     negate: bool,
-    /// The result is brought to its type's range: narrow integers wrap, halves are rounded.
+    /// True if the result is brought into its type's range: narrow integers wrap, halves are rounded.
     wrap: bool,
 }
 
@@ -86,7 +86,7 @@ impl Elementwise {
         }
     }
 
-    /// The row of an operation of SPIR-V.
+    /// The row of a SPIR-V operation.
     fn of(op: Op) -> Option<Self> {
         Some(match op {
             Op::IAdd => wrapped(Ir::IAdd, Ir::IAdd64),
@@ -218,10 +218,10 @@ fn extend(t: &mut Translator, extension: Extension, scalars: &[Scalar], src: &[R
         .collect()
 }
 
-/// Operands, all of one size: the scalar types of all, and the registers of each.
+/// Operands of the same size: their scalar types, and the registers of each.
 type Operands = (Vec<Scalar>, Vec<Rc<[Reg]>>);
 
-/// So many operands of an instruction, from a position on.
+/// `count` operands of an instruction, from a position on.
 pub fn operands(
     t: &mut Translator,
     it: &Instruction,
@@ -241,7 +241,7 @@ pub fn operands(
     Ok((scalars, all))
 }
 
-/// Applies a function to each component of operands, whose scalar types it is given too.
+/// Applies a function to each component of operands. The function also gets their scalar types.
 fn each(
     t: &mut Translator,
     it: &Instruction,
@@ -260,7 +260,7 @@ fn each(
     t.define(it, regs)
 }
 
-/// Everything that works component by component, but for conversions.
+/// Translates everything that works component by component, except conversions.
 pub fn elementwise(t: &mut Translator, it: &Instruction) -> Result<()> {
     match it.opcode {
         Op::FAdd => add(t, it),
@@ -284,7 +284,7 @@ pub fn elementwise(t: &mut Translator, it: &Instruction) -> Result<()> {
     }
 }
 
-/// `a * b`, to be fused with an addition later if that is allowed.
+/// Translates `a * b`, which an addition may fuse later if that is allowed.
 fn multiply(t: &mut Translator, it: &Instruction) -> Result<()> {
     let contract = t.may_contract(it);
     each(t, it, 0, 2, |t, scalars, src| {
@@ -297,7 +297,7 @@ fn multiply(t: &mut Translator, it: &Instruction) -> Result<()> {
     })
 }
 
-/// `a + b`, fused if one is a product.
+/// Translates `a + b`, fused if one operand is a product.
 fn add(t: &mut Translator, it: &Instruction) -> Result<()> {
     let contract = t.may_contract(it);
     each(t, it, 0, 2, |t, scalars, src| {
@@ -332,7 +332,7 @@ pub fn derivative(t: &mut Translator, it: &Instruction, axes: &[Axis], fine: boo
     })
 }
 
-/// `OpSelect`, by a condition for each component or for all.
+/// Translates `OpSelect`, with a condition for each component or one for all.
 fn select(t: &mut Translator, it: &Instruction) -> Result<()> {
     let conditions = t.regs(it.id(0)?)?;
     let (a, b) = (t.regs(it.id(1)?)?, t.regs(it.id(2)?)?);
@@ -353,7 +353,7 @@ fn fold_bools(t: &mut Translator, it: &Instruction, op: Ir) -> Result<()> {
     t.define(it, folded.into_iter().collect())
 }
 
-/// Operations with two results: the low half, then the carry or the high half.
+/// Translates operations with two results: the low half, then the carry or the high half.
 fn extended_arithmetic(t: &mut Translator, it: &Instruction) -> Result<()> {
     let (scalar, a) = t.vector(it.id(0)?)?;
     let (_, b) = t.vector(it.id(1)?)?;
@@ -397,7 +397,7 @@ fn word_halves(t: &mut Translator, opcode: Op, a: Reg, b: Reg) -> Halves {
     }
 }
 
-/// Extended arithmetic on 8 or 16 bits: 32 bits hold the whole result, of which the high half is cut off.
+/// Extended arithmetic on 8 or 16 bits: 32 bits hold the whole result, and the high half is extracted.
 fn narrow_halves(
     t: &mut Translator,
     opcode: Op,
@@ -446,7 +446,7 @@ fn wide_halves(t: &mut Translator, opcode: Op, a: Reg, b: Reg) -> Halves {
         _ => {
             let mut high = wide_product_high(t, a, b);
             if opcode == Op::SMulExtended {
-                // A negative factor counts for 2^64 more as an unsigned one.
+                // A negative factor, read as unsigned, is greater by 2^64.
                 let zero = t.emit.u64(0);
                 for (factor, other) in [(a, b), (b, a)] {
                     let negative = t.emit.op(Ir::SLt64, &[factor, zero]);
@@ -503,7 +503,7 @@ fn shift(t: &mut Translator, it: &Instruction) -> Result<()> {
     })
 }
 
-/// Operations on the bits of integers of any width.
+/// Translates operations on the bits of integers of any width.
 fn bit_operation(t: &mut Translator, it: &Instruction) -> Result<()> {
     let (scalar, base) = t.vector(it.id(0)?)?;
     let Scalar::Int { width, .. } = scalar else {
@@ -544,14 +544,14 @@ fn bit_operation(t: &mut Translator, it: &Instruction) -> Result<()> {
     t.define(it, regs)
 }
 
-/// A run of bits: both are registers of 32 bits.
+/// A range of bits; both members are registers of 32 bits.
 #[derive(Clone, Copy)]
 struct BitField {
     offset: Reg,
     count: Reg,
 }
 
-/// An offset or a count of bits in a register of 32 bits.
+/// An offset or a number of bits, in a register of 32 bits.
 fn bit_number(t: &mut Translator, id: u32) -> Result<Reg> {
     let (scalar, regs) = t.vector(id)?;
     match *regs {
@@ -652,7 +652,7 @@ fn wide_bit_field(
     }
 }
 
-/// An extended instruction of GLSL.std.450 that works component by component.
+/// Translates an extended instruction of GLSL.std.450 that works component by component.
 pub fn glsl_elementwise(t: &mut Translator, it: &Instruction, op: G) -> Result<()> {
     if let Some(row) = Elementwise::of_glsl(op) {
         return row.apply(t, it, 2);
@@ -686,7 +686,7 @@ pub fn glsl_elementwise(t: &mut Translator, it: &Instruction, op: G) -> Result<(
     }
 }
 
-/// Applies a function of GLSL to each component; results are brought to the range of the operands' type.
+/// Applies a function of GLSL to each component; results are brought into the range of the operands' type.
 fn glsl_each(
     t: &mut Translator,
     it: &Instruction,
@@ -776,7 +776,7 @@ fn smooth_step(t: &mut Translator, scalar: Scalar, src: &[Reg]) -> Reg {
     t.emit.mul(scalar, square, slope)
 }
 
-/// Conversions, `OpBitcast`, and between addresses and integers.
+/// Translates conversions, `OpBitcast`, and conversions between addresses and integers.
 pub fn conversion(t: &mut Translator, it: &Instruction) -> Result<()> {
     let opcode = it.opcode;
     if matches!(opcode, Op::Bitcast | Op::ConvertPtrToU | Op::ConvertUToPtr) {
@@ -862,8 +862,8 @@ fn convert(t: &mut Translator, opcode: Op, from: Scalar, to: Scalar, reg: Reg) -
     })
 }
 
-/// A double as a single from which rounding further to a half gives what rounding the double at once would: rounded
-/// towards zero, and made odd if that was inexact.
+/// A binary64 rounded to odd in binary32: towards zero, with the lowest bit set if that was inexact. Rounding it
+/// further to binary16 gives the same result as rounding the binary64 once.
 fn round_to_odd(t: &mut Translator, reg: Reg) -> Reg {
     let near = t.emit.op(Ir::F64ToF, &[reg]);
     let back = t.emit.op(Ir::FToF64, &[near]);
@@ -880,7 +880,7 @@ fn round_to_odd(t: &mut Translator, reg: Reg) -> Reg {
     t.emit.select(inexact, odd, near)
 }
 
-/// `OpQuantizeToF16`: to what a half can hold, with denormals flushed to zero of the same sign.
+/// Translates `OpQuantizeToF16`: rounds to a half, with denormals flushed to zero of the same sign.
 fn quantize(t: &mut Translator, reg: Reg) -> Reg {
     let rounded = t.emit.op(Ir::RoundToF16, &[reg]);
     let size = t.emit.op(Ir::FAbs, &[rounded]);
@@ -891,7 +891,7 @@ fn quantize(t: &mut Translator, reg: Reg) -> Reg {
     t.emit.select(denormal, zero, rounded)
 }
 
-/// Reads the same bits as another type; what has fewer components has wider ones.
+/// Translates a bitcast. The type with fewer components has wider ones.
 fn bitcast(t: &mut Translator, it: &Instruction) -> Result<()> {
     let from = match t.globals.types.vector(t.type_of(it.id(0)?)?) {
         Ok((scalar, _)) => scalar,
@@ -934,7 +934,7 @@ fn typed_bits(t: &mut Translator, scalar: Scalar, reg: Reg) -> Reg {
     }
 }
 
-/// The bits of scalars in order, in words of 32.
+/// The bits of scalars in order, in words of 32 bits.
 fn pack_words(t: &mut Translator, scalar: Scalar, regs: &[Reg]) -> Vec<Reg> {
     let width = scalar.bits();
     if width == 64 {

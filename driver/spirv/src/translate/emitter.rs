@@ -1,4 +1,4 @@
-//! Makes instructions of the IR: constants are folded, and what is made is counted.
+//! Emits instructions of the IR: folds constants, and counts the instructions.
 
 use std::collections::HashMap;
 
@@ -9,7 +9,7 @@ use isa::op::Op as Ir;
 use crate::error::{Diagnostic, Error, Result};
 use crate::types::Scalar;
 
-/// The most instructions that a shader may become.
+/// The most IR instructions of a shader.
 const MAX_STATEMENTS: u64 = 1 << 22;
 
 /// The 32-bit or the 64-bit form of an operation.
@@ -17,7 +17,7 @@ pub fn op_for_width(scalar: Scalar, narrow: Ir, wide: Ir) -> Ir {
     if scalar.is_wide() { wide } else { narrow }
 }
 
-/// Makes instructions at the end of a program.
+/// Appends instructions to a program.
 #[derive(Debug)]
 pub struct Emitter {
     pub builder: Builder,
@@ -25,7 +25,7 @@ pub struct Emitter {
     constants: HashMap<Reg, u64>,
     /// Factors of products that may be fused with an addition.
     products: HashMap<Reg, (Reg, Reg)>,
-    /// Instructions made so far, and those that others counted.
+    /// Instructions emitted so far, including those that callers counted.
     statements: u64,
 }
 
@@ -40,7 +40,7 @@ impl Emitter {
         }
     }
 
-    /// Counts instructions about to be made.
+    /// Counts instructions before they are emitted.
     pub fn charge_budget(&mut self, count: usize) -> Result<()> {
         self.statements += count as u64;
         if self.statements > MAX_STATEMENTS {
@@ -52,7 +52,8 @@ impl Emitter {
         Ok(())
     }
 
-    /// `op(src...)`. What one instruction of SPIR-V can become is bounded, so the count is checked by instruction.
+    /// Emits `op(src...)`. The number that one SPIR-V instruction becomes is bounded, so the limit is checked once for
+    /// each.
     pub fn op(&mut self, op: Ir, src: &[Reg]) -> Reg {
         self.statements += 1;
         if let Some(folded) = self.fold(op, src) {
@@ -98,7 +99,7 @@ impl Emitter {
         self.constants.get(&reg).map(|bits| *bits as u32)
     }
 
-    /// Integer arithmetic on constants, as addresses need it.
+    /// Folds integer arithmetic on constants, as addresses need it.
     fn fold(&mut self, op: Ir, src: &[Reg]) -> Option<Reg> {
         let [a, b] = src else {
             return None;
@@ -152,7 +153,7 @@ impl Emitter {
         }
     }
 
-    /// Brings a result to its type's range: narrow integers wrap, halves are rounded.
+    /// Brings a result into its type's range: narrow integers wrap, halves are rounded.
     pub fn wrap_to_width(&mut self, scalar: Scalar, reg: Reg) -> Reg {
         match scalar {
             Scalar::Int {
@@ -177,7 +178,7 @@ impl Emitter {
         self.op(Ir::And, &[reg, mask])
     }
 
-    /// An integer operand, extended by its sign whatever its type's signedness is.
+    /// An integer operand, sign-extended whatever its type's signedness is.
     pub fn sign_extend(&mut self, scalar: Scalar, reg: Reg) -> Reg {
         match scalar {
             Scalar::Int {
@@ -192,7 +193,7 @@ impl Emitter {
         }
     }
 
-    /// An integer operand, extended by zeros.
+    /// An integer operand, zero-extended.
     pub fn zero_extend(&mut self, scalar: Scalar, reg: Reg) -> Reg {
         match scalar {
             Scalar::Int {
@@ -227,7 +228,7 @@ impl Emitter {
         self.wrap_to_width(scalar, reg)
     }
 
-    /// Remembers that a register is a product that may be fused with an addition.
+    /// Records that a register is a product that may be fused with an addition.
     pub fn set_product(&mut self, product: Reg, factors: (Reg, Reg)) {
         self.products.insert(product, factors);
     }

@@ -14,7 +14,7 @@ use crate::error::{Result, malformed};
 use crate::instruction::Instruction;
 use crate::types::Scalar;
 
-/// `OpExtInst` of GLSL.std.450.
+/// Translates `OpExtInst` of GLSL.std.450.
 pub fn glsl(t: &mut Translator, it: &Instruction) -> Result<()> {
     let Some(op) = G::from_u32(it.number(1)?) else {
         return malformed(format!("GLSL.std.450 has no instruction {}", it.number(1)?));
@@ -73,7 +73,7 @@ pub fn glsl(t: &mut Translator, it: &Instruction) -> Result<()> {
     }
 }
 
-/// An exponent of 32 bits. One of 64 bits is brought near zero first, yet stays beyond that of any float.
+/// An exponent of 32 bits. One of 64 bits is clamped to a range that still exceeds any float's exponent.
 fn ldexp_exponent(t: &mut Translator, scalar: Scalar, exponent: Reg) -> Reg {
     const MOST: i64 = 1 << 16;
     if !scalar.is_wide() {

@@ -23,7 +23,7 @@ struct ImageOperands {
     lod: Option<Reg>,
     gradient: Option<(Vec<Reg>, Vec<Reg>)>,
     offset: Vec<Reg>,
-    /// Four offsets, one after the other.
+    /// Four offsets, in order.
     offsets: Vec<Reg>,
     sample: Option<Reg>,
     minimum: Option<Reg>,
@@ -68,7 +68,7 @@ impl SampleOp {
     }
 }
 
-/// Image instructions.
+/// Translates image instructions.
 pub fn image(t: &mut Translator, it: &Instruction) -> Result<()> {
     match it.opcode {
         Op::SampledImage => {
@@ -94,7 +94,7 @@ pub fn image(t: &mut Translator, it: &Instruction) -> Result<()> {
     }
 }
 
-/// The image of an operand that is one, with or without a sampler.
+/// The image of an operand that is an image, with or without a sampler.
 fn image_operand(t: &mut Translator, id: u32) -> Result<(Binding, ImageType)> {
     match t.value(id)? {
         Value::Image(binding, ty) | Value::SampledImage(binding, ty, _) => Ok((binding, ty)),
@@ -145,7 +145,7 @@ fn image_operands(t: &mut Translator, it: &Instruction, from: usize) -> Result<I
     Ok(image_operands)
 }
 
-/// The first registers of a coordinate, as many as the shape needs.
+/// The first registers of a coordinate, the number that the shape needs.
 fn coordinate(t: &mut Translator, id: u32, count: usize) -> Result<Vec<Reg>> {
     match t.regs(id)?.get(..count) {
         Some(regs) => Ok(regs.to_vec()),
@@ -157,7 +157,7 @@ fn texels(t: &mut Translator, count: usize) -> [Option<Reg>; 4] {
     std::array::from_fn(|index| (index < count).then(|| t.emit.builder.value(IrType::B32)))
 }
 
-/// Defines the result of a read or sample, rounded if its type is.
+/// Defines the result of a read or sample, rounded if its type requires it.
 fn define_texel(
     t: &mut Translator,
     it: &Instruction,
@@ -216,7 +216,7 @@ fn sample(t: &mut Translator, it: &Instruction, sample_op: &SampleOp) -> Result<
         }))
     };
     if sample_op.gather && !image_operands.offsets.is_empty() {
-        // With four offsets, each result is the last texel of a gather of its own.
+        // With four offsets, each result is the last texel of a separate gather.
         let mut regs = Vec::with_capacity(4);
         for offset in image_operands.offsets.chunks_exact(2).take(4) {
             let dst = t.emit.builder.value(IrType::B32);
@@ -308,7 +308,7 @@ fn read_image(t: &mut Translator, it: &Instruction) -> Result<()> {
     define_texel(t, it, dst.into_iter().flatten())
 }
 
-/// The pixel being shaded, moved by an offset, and its layer: where an input attachment is read.
+/// The position at which an input attachment is read: the current pixel plus an offset, and its layer.
 fn pixel(t: &mut Translator, offset: &[Reg]) -> Result<Vec<Reg>> {
     let mut coordinate = Vec::with_capacity(3);
     for (axis, offset) in (0..2).zip(offset) {
@@ -392,7 +392,7 @@ fn query_image(t: &mut Translator, it: &Instruction) -> Result<()> {
         query,
     });
     let mut regs = dst;
-    // A storage cube is an array of faces to the device.
+    // The device treats a storage cube as an array of faces.
     if is_size
         && image_type.dim == Dim::DimCube
         && image_type.sampled == 2

@@ -58,16 +58,16 @@ pub struct InputsOutputs<'a> {
     pub subgroup_size: u32,
     pub inputs: Vec<Input>,
     pub outputs: Vec<Output>,
-    /// An input is read that differs from sample to sample.
+    /// True if an input is read that differs between samples.
     pub per_sample: bool,
-    /// The registers of inputs that were read.
+    /// The registers of the inputs that were read.
     registers: HashMap<InputSource, Reg>,
-    /// The locations of variables' scalars.
+    /// The locations of the variables' scalars.
     locations: HashMap<u32, Rc<[IoLocation]>>,
 }
 
 impl<'a> InputsOutputs<'a> {
-    /// No inputs and outputs yet, of an entry point.
+    /// The interface of an entry point, still without inputs and outputs.
     pub fn new(
         module: &'a Module,
         globals: &'a Globals,
@@ -128,7 +128,7 @@ impl<'a> InputsOutputs<'a> {
         Ok(locations.into())
     }
 
-    /// Gives each scalar of a type its location and component.
+    /// Assigns a location and component to each scalar of a type.
     fn place(&self, ty: u32, cursor: &mut Cursor, into: &mut Vec<IoLocation>) -> Result<()> {
         match self.globals.types.get(ty)? {
             SpirvType::Scalar(_) | SpirvType::Vector { .. } => {
@@ -215,7 +215,7 @@ impl<'a> InputsOutputs<'a> {
         Ok(())
     }
 
-    /// The register of an input, made when it is first read.
+    /// The register of an input, created when it is first read.
     pub fn input(
         &mut self,
         emit: &mut Emitter,
@@ -278,7 +278,7 @@ impl<'a> InputsOutputs<'a> {
         ))
     }
 
-    /// The layer that a fragment is in.
+    /// The layer of the fragment.
     pub fn layer(&mut self, emit: &mut Emitter) -> Reg {
         self.built_in_input(emit, BuiltIn::Layer, 0, ScalarType::Int { width: 32 })
     }
@@ -427,7 +427,7 @@ impl<'a> InputsOutputs<'a> {
         }
     }
 
-    /// A word of the masks of lanes equal to, above or below one's own.
+    /// A word of the mask of lanes equal to, above or below the current one.
     pub fn lane_mask(&mut self, emit: &mut Emitter, which: Spirv, word: u32) -> Reg {
         let lane = self.subgroup_lane(emit);
         let first = emit.u32(32 * word);
@@ -437,7 +437,7 @@ impl<'a> InputsOutputs<'a> {
         let before = emit.op(Ir::ULt, &[lane, first]);
         let bit = emit.op(Ir::Shl, &[one, offset]);
         let bit = emit.select(within, bit, zero);
-        // Bits below one's own, in this word: none, some, or all.
+        // The bits below the current lane, in this word: none, some, or all.
         let below = emit.op(Ir::ISub, &[bit, one]);
         let below = emit.select(within, below, ones);
         let below = emit.select(before, zero, below);
@@ -519,7 +519,7 @@ fn output_target(location: IoLocation) -> Result<OutputTarget> {
     })
 }
 
-/// Tells if a built-in input follows from the lane.
+/// Reports whether a built-in input is computed from the lane.
 pub fn is_computed(built_in: Spirv) -> bool {
     use Spirv::*;
     matches!(

@@ -1,4 +1,4 @@
-//! Dot products of integers: of vectors, or of words that hold four bytes.
+//! Dot products of integers: of vectors, or of words with four bytes each.
 
 use isa::ir::Reg;
 use isa::op::Op as Ir;
@@ -23,13 +23,14 @@ impl Signs {
         Self { left, right }
     }
 
-    /// The sum is signed if a factor is.
+    /// Reports whether the sum is signed, which it is if a factor is.
     fn sum(self) -> bool {
         self.left || self.right
     }
 }
 
-/// `OpSDot`, `OpUDot`, `OpSUDot`, and the same with an accumulator that the sum is added to, saturating.
+/// Translates `OpSDot`, `OpUDot`, `OpSUDot`, and their forms with an accumulator, to which the sum is added with
+/// saturation.
 pub fn integer_dot(t: &mut Translator, it: &Instruction) -> Result<()> {
     let signs = Signs::of(it.opcode);
     let accumulates = matches!(it.opcode, Op::SDotAccSat | Op::UDotAccSat | Op::SUDotAccSat);
@@ -75,7 +76,7 @@ pub fn integer_dot(t: &mut Translator, it: &Instruction) -> Result<()> {
     t.define(it, vec![reg])
 }
 
-/// The components of an operand, each in 64 bits; of a single word, its four bytes.
+/// The components of an operand, each extended to 64 bits; for a single word, its four bytes.
 fn factors(t: &mut Translator, id: u32, signed: bool) -> Result<Vec<Reg>> {
     let (scalar, regs) = t.vector(id)?;
     match (scalar, &*regs) {
@@ -101,7 +102,7 @@ fn factors(t: &mut Translator, id: u32, signed: bool) -> Result<Vec<Reg>> {
     }
 }
 
-/// An integer in 64 bits.
+/// An integer extended to 64 bits.
 fn widened(t: &mut Translator, scalar: Scalar, reg: Reg, signed: bool) -> Reg {
     match (scalar.is_wide(), signed) {
         (true, _) => reg,
@@ -116,7 +117,7 @@ fn widened(t: &mut Translator, scalar: Scalar, reg: Reg, signed: bool) -> Reg {
     }
 }
 
-/// The sum of two integers in 64 bits, brought into the range of integers of a width.
+/// The sum of two integers in 64 bits, clamped to the range of integers of a width.
 fn saturated_sum(t: &mut Translator, width: u32, signed: bool, a: Reg, b: Reg) -> Reg {
     let sum = t.emit.op(Ir::IAdd64, &[a, b]);
     match (width, signed) {

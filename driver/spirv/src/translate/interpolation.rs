@@ -1,4 +1,4 @@
-//! Interpolation of inputs elsewhere in the pixel.
+//! Interpolation of inputs at other points of the pixel.
 
 use isa::ir::{Axis, Rate, Reg};
 use isa::op::Op as Ir;
@@ -48,11 +48,11 @@ fn sample_offsets(samples: u32) -> &'static [[i8; 2]] {
     }
 }
 
-/// A point of the pixel at which an input is taken.
+/// The point of the pixel at which an input is evaluated.
 #[derive(Clone, Copy)]
 enum Point {
     Centroid,
-    /// Moved from where inputs are taken otherwise, in pixels.
+    /// Offset from the point at which inputs are otherwise evaluated, in pixels.
     Offset([Reg; 2]),
 }
 
@@ -60,15 +60,15 @@ enum Point {
 #[derive(Clone, Copy)]
 struct Interpolant<'a> {
     variable: u32,
-    /// Scalars before it.
+    /// The number of scalars before it.
     start: usize,
-    /// Moves from there that are known at run time only.
+    /// Dynamic indices from there, known only at run time.
     indices: &'a [DynamicIndex],
     ty: u32,
 }
 
-/// Interpolation elsewhere in the pixel. At a centroid it is an input of its own; at a sample or an offset it
-/// follows from the derivatives of the attribute divided by w, which are constant over the primitive.
+/// Translates interpolation at another point of the pixel. At the centroid it is a separate input; at a sample or an
+/// offset it is computed from the derivatives of the attribute divided by w, which are constant over the primitive.
 pub fn interpolate(t: &mut Translator, it: &Instruction, op: G) -> Result<()> {
     let pointer = t.pointer(it.id(2)?)?;
     let Some(interpolant) = interpolant(t, &pointer) else {
@@ -90,8 +90,8 @@ pub fn interpolate(t: &mut Translator, it: &Instruction, op: G) -> Result<()> {
     t.define(it, regs)
 }
 
-/// An offset from the pixel's centre as one from where the fragment takes its inputs: the centre too, or a sample if each
-/// is shaded.
+/// An offset from the pixel's centre, converted to one from the point at which the fragment evaluates its inputs: the
+/// centre, or a sample if each sample is shaded.
 fn from_own_point(t: &mut Translator, offset: [Reg; 2]) -> Result<[Reg; 2]> {
     let mut moved = offset;
     for (axis, moved) in (0..).zip(&mut moved) {
@@ -104,8 +104,8 @@ fn from_own_point(t: &mut Translator, offset: [Reg; 2]) -> Result<[Reg; 2]> {
     Ok(moved)
 }
 
-/// The interpolant elsewhere in the pixel. Of an array indexed at run time, each element is interpolated before one is
-/// picked: neighbours in a quad, from which derivatives follow, may pick others.
+/// The interpolant at another point of the pixel. For an array indexed at run time, each element is interpolated before
+/// one is selected: neighbours in a quad, which derivatives need, may select others.
 fn interpolated(t: &mut Translator, interpolant: Interpolant, point: Point) -> Result<Vec<Reg>> {
     let Some((dynamic, inner)) = interpolant.indices.split_first() else {
         return interpolated_part(t, interpolant, point);
@@ -128,7 +128,7 @@ fn interpolated(t: &mut Translator, interpolant: Interpolant, point: Point) -> R
     Ok(picked)
 }
 
-/// As [`interpolated`], of a part whose place is constant.
+/// As [`interpolated`], for a part whose place is constant.
 fn interpolated_part(
     t: &mut Translator,
     interpolant: Interpolant,
@@ -180,7 +180,7 @@ fn sample_offset(t: &mut Translator, sample: Reg) -> [Reg; 2] {
     })
 }
 
-/// Reads a part of an input as it is elsewhere in the pixel.
+/// Reads a part of an input, evaluated at another point of the pixel.
 fn read_input(
     t: &mut Translator,
     interpolant: Interpolant,
@@ -211,7 +211,7 @@ fn read_input(
     Ok(regs)
 }
 
-/// The part of an input variable that a pointer leads to.
+/// The part of an input variable to which a pointer points.
 fn interpolant<'a>(t: &Translator, pointer: &'a Pointer) -> Option<Interpolant<'a>> {
     let Pointer::PromotedVariable {
         variable,

@@ -16,14 +16,14 @@ use crate::types::{Scalar, Type};
 /// The most elements of one load or store of the IR.
 const MAX_ELEMENTS: usize = 16;
 
-/// Scalars that lie next to each other: their first byte, format, and their places in the value.
+/// Adjacent scalars: their first byte, format, and their indices in the value.
 struct ContiguousAccess {
     offset: u32,
     format: Format,
     places: Vec<usize>,
 }
 
-/// `OpLoad`.
+/// Translates `OpLoad`.
 pub fn load(t: &mut Translator, it: &Instruction) -> Result<()> {
     let pointer = t.pointer(it.id(0)?)?;
     if let Pointer::Resource { binding, ty, .. } = pointer {
@@ -42,21 +42,21 @@ pub fn load(t: &mut Translator, it: &Instruction) -> Result<()> {
     t.define(it, regs)
 }
 
-/// `OpStore`.
+/// Translates `OpStore`.
 pub fn store(t: &mut Translator, it: &Instruction) -> Result<()> {
     let pointer = t.pointer(it.id(0)?)?;
     let regs = t.regs(it.id(1)?)?;
     store_to(t, &pointer, &regs)
 }
 
-/// `OpCopyMemory`.
+/// Translates `OpCopyMemory`.
 pub fn copy_memory(t: &mut Translator, it: &Instruction) -> Result<()> {
     let (target, source) = (t.pointer(it.id(0)?)?, t.pointer(it.id(1)?)?);
     let regs = load_from(t, &source)?;
     store_to(t, &target, &regs)
 }
 
-/// The value that a pointer points to.
+/// Loads the value to which a pointer points.
 pub fn load_from(t: &mut Translator, pointer: &Pointer) -> Result<Vec<Reg>> {
     match pointer {
         Pointer::PromotedVariable {
@@ -78,7 +78,7 @@ pub fn load_from(t: &mut Translator, pointer: &Pointer) -> Result<Vec<Reg>> {
     }
 }
 
-/// Replaces what a pointer points to.
+/// Stores a value to which a pointer points.
 pub fn store_to(t: &mut Translator, pointer: &Pointer, regs: &[Reg]) -> Result<()> {
     match pointer {
         Pointer::PromotedVariable {
@@ -139,7 +139,7 @@ fn store_place(t: &mut Translator, place: &MemoryRef, regs: &[Reg]) -> Result<()
     Ok(())
 }
 
-/// The scalars of a value in memory, in runs of adjacent ones.
+/// The scalars of a value in memory, grouped into runs of adjacent ones.
 fn runs(t: &Translator, place: &MemoryRef, scalars: &[Scalar]) -> Result<Vec<ContiguousAccess>> {
     let mut offsets = Vec::with_capacity(scalars.len());
     add_offsets(t, place.ty, place.layout, 0, &mut offsets)?;
@@ -260,7 +260,7 @@ fn add_offsets(
     Ok(())
 }
 
-/// A scalar's register from what was loaded.
+/// Converts a loaded register to that of the scalar.
 fn loaded_scalar(t: &mut Translator, scalar: Scalar, layout: MemoryLayout, loaded: Reg) -> Reg {
     match scalar {
         Scalar::Bool => {
@@ -272,7 +272,7 @@ fn loaded_scalar(t: &mut Translator, scalar: Scalar, layout: MemoryLayout, loade
     }
 }
 
-/// The register to store for a scalar.
+/// Converts a scalar's register to the one that is stored.
 fn stored_scalar(t: &mut Translator, scalar: Scalar, layout: MemoryLayout, reg: Reg) -> Reg {
     match scalar {
         Scalar::Bool => {

@@ -1,12 +1,12 @@
-//! From SPIR-V to the device's IR.
+//! Translation of SPIR-V to the device's IR.
 //!
-//! A function's blocks become a tree of constructs first ([`structurize`]); then the tree is walked ([`control_flow`])
-//! and each instruction is taken apart into scalar ones ([`instruction`]). Calls are inlined. Variables of a function,
-//! `Private` variables, inputs and outputs are never stored to by an instruction of the IR: a store only notes the
-//! registers that hold the variable now, and where control flow comes together a variable that differs becomes a
-//! variable of the IR ([`promoted`]). Those that are arrays indexed at run time live in per-lane memory instead.
+//! A function's blocks first become a tree of constructs ([`structurize`]); then the tree is walked ([`control_flow`])
+//! and each instruction becomes scalar ones ([`instruction`]). Calls are inlined. Variables of a function, `Private`
+//! variables, inputs and outputs are not stored to by instructions of the IR: a store only records the registers that
+//! hold the variable from then on, and where control flow joins, a variable that differs becomes a variable of the IR
+//! ([`promoted`]). Variables with arrays that are indexed at run time are in per-lane memory instead.
 //!
-//! All sizes are bounded: scalars of a value, nesting, calls, and the instructions made.
+//! All sizes are bounded: scalars of a value, nesting, calls, and emitted instructions.
 
 mod analysis;
 mod atomic;
@@ -51,16 +51,15 @@ use translator::Translator;
 
 pub use options::Options;
 
-/// The stack that a translation runs on.
+/// The size of the stack of the translating thread.
 const STACK_BYTES: usize = 16 << 20;
 
 /// Translates an entry point.
 ///
-/// That is done on a thread of its own, whose stack is large enough for all nesting that is allowed, whatever the
+/// The translation runs on a thread of its own, whose stack is large enough for all allowed nesting, whatever the
 /// application's stack is.
 ///
-/// # Errors
-/// [`Error`] names what is malformed, unsupported or too large.
+/// # Errors [`Error`] names what is malformed, unsupported or too large.
 pub fn translate(
     module: &Module,
     name: &str,
@@ -127,7 +126,7 @@ fn translate_here(
     finish(control_flow.t)
 }
 
-/// The interface of an entry point as its execution modes begin it: nothing goes in or out yet.
+/// The interface of an entry point with its execution modes, still without inputs and outputs.
 fn execution_modes(
     module: &Module,
     globals: &Globals,
@@ -157,7 +156,7 @@ fn execution_modes(
     Ok(interface)
 }
 
-/// The workgroup's size from the constant that is decorated as it, which wins over the execution mode.
+/// The workgroup's size from the constant with the built-in decoration, which overrides the execution mode.
 fn built_in_workgroup_size(module: &Module, globals: &Globals) -> Option<[u32; 3]> {
     let mut constants = globals.constants.iter();
     let (_, constant) =
@@ -252,7 +251,7 @@ fn find_entry(module: &Module, name: &str, stage: Stage) -> Result<u32, Error> {
         .ok_or_else(|| no_entry(name, stage))
 }
 
-/// Refuses modules that declare what isn't supported.
+/// Refuses modules that declare unsupported capabilities.
 fn check_capabilities(module: &Module) -> Result<(), Error> {
     for it in &module.sections.capabilities {
         if let Some(capability) = it.enumerant(0, Capability::from_u32)

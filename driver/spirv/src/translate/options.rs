@@ -7,7 +7,7 @@ pub struct Options {
     pub subgroup_size: u32,
     /// Samples of a pixel that `interpolateAtSample` may name, at the standard positions.
     pub samples: u32,
-    /// The length that a descriptor array without one is given.
+    /// The length used for a descriptor array without one.
     pub unsized_descriptors: u32,
 }
 

@@ -19,7 +19,7 @@ enum Index {
     Dynamic { reg: Reg, scalar: Scalar },
 }
 
-/// `OpAccessChain` and its relatives.
+/// Translates `OpAccessChain` and its variants.
 pub fn access_chain(t: &mut Translator, it: &Instruction) -> Result<()> {
     let by_element = matches!(it.opcode, Op::PtrAccessChain | Op::InBoundsPtrAccessChain);
     let mut pointer = t.pointer(it.id(0)?)?;
@@ -52,7 +52,7 @@ fn index(t: &mut Translator, id: u32) -> Result<Index> {
     }
 }
 
-/// A pointer moved by whole elements of the array that it points into.
+/// A pointer moved by a number of elements of the array into which it points.
 fn next_element(t: &mut Translator, pointer: Pointer, ty: u32, element: Index) -> Result<Pointer> {
     let Pointer::Memory(place) = pointer else {
         return unsupported("pointer arithmetic on this pointer");
@@ -74,7 +74,7 @@ fn pointer_to_part(t: &mut Translator, pointer: Pointer, index: Index) -> Result
                     let (part, before) = t.globals.types.part(ty, index)?;
                     (part, start + before as usize)
                 }
-                // What is past the end may stand in code that never runs.
+                // An index past the end may be in code that never runs.
                 _ => {
                     let index = match index {
                         Index::Constant(index) => t.emit.u32(index),
@@ -108,12 +108,13 @@ fn pointer_to_part(t: &mut Translator, pointer: Pointer, index: Index) -> Result
     }
 }
 
-/// Tells if a constant index is within a composite type; members of a struct always are, or the module is malformed.
+/// Reports whether a constant index is within a composite type. A member of a struct always is, unless the module is
+/// malformed.
 fn has_part(t: &Translator, ty: u32, index: u32) -> bool {
     elements(t, ty).map_or(true, |(_, count)| index < count)
 }
 
-/// The element type and the length of what a run-time index may go into.
+/// The element type and the length of a type that can be indexed at run time.
 fn elements(t: &Translator, ty: u32) -> Result<(u32, u32)> {
     match t.globals.types.get(ty)? {
         Type::Vector { element, count }
@@ -237,7 +238,7 @@ fn moved(t: &mut Translator, mut place: MemoryRef, index: Index, stride: u32) ->
     Ok(place)
 }
 
-/// One element, of `each` descriptors, of an array of descriptors.
+/// Selects one element, of `each` descriptors, of an array of descriptors.
 fn pick_descriptor(t: &mut Translator, array: Binding, index: Index, each: u32) -> Result<Binding> {
     let index = match index {
         Index::Constant(index) if array.index.is_none() => {
@@ -265,7 +266,7 @@ fn pick_descriptor(t: &mut Translator, array: Binding, index: Index, each: u32) 
     })
 }
 
-/// `OpArrayLength`.
+/// Translates `OpArrayLength`.
 pub fn array_length(t: &mut Translator, it: &Instruction) -> Result<()> {
     let pointer = t.pointer(it.id(0)?)?;
     let member = it.number(1)?;

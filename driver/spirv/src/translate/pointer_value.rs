@@ -1,4 +1,4 @@
-//! Pointers compared and subtracted.
+//! Comparison and subtraction of pointers.
 
 use isa::ir::Reg;
 use isa::op::Op as Ir;
@@ -8,7 +8,7 @@ use super::translator::{Translator, workgroup_layout};
 use crate::error::{Result, malformed, unsupported};
 use crate::instruction::Instruction;
 
-/// `OpPtrEqual`, `OpPtrNotEqual` and `OpPtrDiff`.
+/// Translates `OpPtrEqual`, `OpPtrNotEqual` and `OpPtrDiff`.
 pub fn compare_pointers(t: &mut Translator, it: &Instruction) -> Result<()> {
     let (a, b) = (t.regs(it.id(0)?)?, t.regs(it.id(1)?)?);
     if a.len() != b.len() {
@@ -40,7 +40,7 @@ pub fn compare_pointers(t: &mut Translator, it: &Instruction) -> Result<()> {
     t.define(it, vec![result])
 }
 
-/// Elements from one pointer to another into the same array.
+/// The number of elements from one pointer to another into the same array.
 fn pointer_difference(t: &mut Translator, it: &Instruction, a: &[Reg], b: &[Reg]) -> Result<()> {
     let ty = t.type_of(it.id(0)?)?;
     let stride = element_stride(t, ty)?;
@@ -61,7 +61,7 @@ fn pointer_difference(t: &mut Translator, it: &Instruction, a: &[Reg], b: &[Reg]
     t.define(it, vec![elements])
 }
 
-/// Bytes from one element to the next of the array that a pointer of a type leads into; never zero.
+/// The bytes between elements of the array into which a pointer of a type points; never zero.
 pub fn element_stride(t: &Translator, ty: u32) -> Result<u32> {
     let (class, pointee) = t.globals.types.pointer(ty)?;
     if class == StorageClass::Workgroup && !workgroup_layout(t).explicit {

@@ -1,4 +1,4 @@
-//! Variables that are held in registers.
+//! Variables held in registers.
 
 use std::collections::HashMap;
 use std::rc::Rc;
@@ -12,15 +12,15 @@ use super::value::DynamicIndex;
 use crate::error::{Result, malformed};
 use crate::types::Scalar;
 
-/// A variable: the registers that hold it where the translation is now.
+/// A variable, with the registers that hold it at the current place of the translation.
 #[derive(Clone, Debug)]
 pub struct PromotedVariable {
     pub scalars: Rc<[Scalar]>,
-    /// None where nothing was stored yet.
+    /// The current registers; None for a scalar that has not been stored to.
     pub now: Vec<Option<Reg>>,
-    /// Inputs: the variable, to find out where a scalar comes from.
+    /// For an input, the id of the variable, which gives the source of a scalar.
     pub input: Option<u32>,
-    /// Scalars that were ever stored to.
+    /// True for scalars that were stored to.
     pub written: Vec<bool>,
 }
 
@@ -29,14 +29,14 @@ pub struct PromotedVariable {
 pub struct PromotedPart<'a> {
     /// The variable's number.
     pub variable: usize,
-    /// Scalars before the part.
+    /// The number of scalars before the part.
     pub start: usize,
-    /// Moves from there that are known at run time only.
+    /// Dynamic indices from there, known only at run time.
     pub indices: &'a [DynamicIndex],
 }
 
 impl PromotedPart<'_> {
-    /// The part without its first index, which picks an element.
+    /// The part selected by an element of its first dynamic index.
     fn element(&self, dynamic: &DynamicIndex, element: u32) -> Self {
         Self {
             start: self.start + (element * dynamic.scalars) as usize,
@@ -55,7 +55,7 @@ pub struct PromotedVariables {
 }
 
 impl PromotedVariables {
-    /// Adds a variable of these scalars; returns its number.
+    /// Adds a variable with these scalars. Returns its number.
     pub fn add(&mut self, scalars: Rc<[Scalar]>, input: Option<u32>) -> usize {
         self.variables.push(PromotedVariable {
             now: vec![None; scalars.len()],
@@ -66,17 +66,17 @@ impl PromotedVariables {
         self.variables.len() - 1
     }
 
-    /// Lets an id stand for a variable.
+    /// Makes an id refer to a variable.
     pub fn bind(&mut self, id: u32, variable: usize) {
         self.numbers.insert(id, variable);
     }
 
-    /// Lets an id stand for no variable.
+    /// Removes the variable of an id.
     pub fn unbind(&mut self, id: u32) {
         self.numbers.remove(&id);
     }
 
-    /// The variable that an id of a variable or parameter stands for, if it is held in registers.
+    /// The variable to which the id of a variable or parameter refers, if it is held in registers.
     pub fn find(&self, id: u32) -> Option<usize> {
         self.numbers.get(&id).copied()
     }
@@ -122,7 +122,7 @@ impl PromotedVariables {
         }
     }
 
-    /// Reads so many scalars of a part.
+    /// Reads `count` scalars of a part.
     pub fn read(
         &mut self,
         emit: &mut Emitter,
@@ -148,7 +148,7 @@ impl PromotedVariables {
         Ok(result)
     }
 
-    /// Writes scalars of a part, where `condition` holds if there is one.
+    /// Writes scalars of a part, only where `condition` holds if there is one.
     pub fn write(
         &mut self,
         emit: &mut Emitter,

@@ -1,8 +1,8 @@
-//! From a function's control-flow graph to a tree of constructs.
+//! Converts a function's control-flow graph to a tree of constructs.
 //!
-//! SPIR-V's merge instructions say where constructs begin and end; this module walks the blocks once, in the order of
-//! execution, and turns each branch into one of three things: going on in the same list, reaching the end of the
-//! construct, or a jump (break or continue). Each block lands in the tree once, or the function isn't structured.
+//! SPIR-V's merge instructions delimit constructs. This module walks the blocks once, in the order of execution, and
+//! turns each branch into one of three things: continuing in the same list, reaching the end of the construct, or a
+//! jump (break or continue). Each block is put in the tree once; otherwise the function isn't structured.
 
 use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
@@ -17,17 +17,17 @@ use crate::module::Function;
 /// A construct that can be left from within others: an index, unique in the function.
 pub type Construct = usize;
 
-/// A place where control flow comes together: an index into [`Tree::edges`].
+/// A place where control flow joins: an index into [`Tree::edges`].
 pub type MergePoint = usize;
 
 /// The way in which an edge leaves its list of nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Jump {
-    /// By reaching its end, or by going on.
+    /// It reaches the end of the list, or goes on in it.
     None,
-    /// By breaking out of a loop, a switch or a selection.
+    /// It breaks out of a loop, a switch or a selection.
     Break(Construct),
-    /// By continuing a loop.
+    /// It continues a loop.
     Continue(Construct),
 }
 
@@ -47,7 +47,7 @@ pub struct Case {
     pub default: bool,
     pub body: Vec<Node>,
     pub fallthrough: bool,
-    /// If the case before falls through to this one: where they meet, and the edge from the switch itself.
+    /// The merge point and the edge from the switch itself, if the case before falls through to this one.
     pub entry: Option<(MergePoint, Edge)>,
 }
 
@@ -59,9 +59,9 @@ pub enum Node {
     Edge(Edge),
     If {
         block: usize,
-        /// None if both branches lead to `then`.
+        /// The condition; None if both branches go to `then`.
         condition: Option<u32>,
-        /// Given if edges break out of it.
+        /// The scope, if edges break out of it.
         scope: Option<Construct>,
         then: Vec<Node>,
         otherwise: Vec<Node>,
@@ -100,7 +100,7 @@ pub struct Tree {
     pub edges: Vec<usize>,
     /// The number of blocks that return.
     pub returns: usize,
-    /// One of them is within a construct.
+    /// True if one of them is within a construct.
     pub early_return: bool,
     /// Variables and pointer parameters that the function stores to.
     pub modified: Rc<[u32]>,
@@ -182,7 +182,7 @@ struct Structurizer<'a> {
     modified: Vec<HashSet<u32>>,
     returns: usize,
     early_return: bool,
-    /// Blocks looked at while ordering cases.
+    /// Blocks visited while ordering cases.
     steps: usize,
     depth: usize,
 }
@@ -234,7 +234,7 @@ impl Structurizer<'_> {
         matches!(found.opcode, Op::LoopMerge | Op::SelectionMerge).then_some(found)
     }
 
-    /// Walks from a block to the end of the list that it belongs to.
+    /// Walks from a block to the end of its list.
     fn region(&mut self, start: usize, nodes: &mut Vec<Node>) -> Result<()> {
         self.depth += 1;
         if self.depth > MAX_NESTING {
@@ -258,7 +258,7 @@ impl Structurizer<'_> {
         Ok(())
     }
 
-    /// A block and its terminator. Returns the block that the same list goes on with.
+    /// Adds a block and its terminator. Returns the block with which the same list goes on.
     fn straight(&mut self, block: usize, nodes: &mut Vec<Node>) -> Result<Option<usize>> {
         nodes.push(Node::Block(block));
         if let (Some(modified), Some(stores)) = (self.modified.last_mut(), self.stores.get(block)) {
@@ -293,7 +293,7 @@ impl Structurizer<'_> {
         }
     }
 
-    /// The merge point at the end of the innermost construct, if that is where a block is.
+    /// The merge point at the end of the innermost construct, if the block is that end.
     fn end_of_construct(&self, to: usize) -> Option<MergePoint> {
         let (block, merge_point) = match self.frames.last()? {
             Frame::Selection {
@@ -312,7 +312,7 @@ impl Structurizer<'_> {
         (block == to).then_some(merge_point)
     }
 
-    /// The jump that reaches a block from anywhere within the constructs around.
+    /// The jump to a block from anywhere within the enclosing constructs.
     fn jump(&self, to: usize) -> Option<(Jump, MergePoint)> {
         let leave = |merge: &Option<(usize, MergePoint)>, construct: Construct| match merge {
             Some((block, merge_point)) if *block == to => {
@@ -347,7 +347,7 @@ impl Structurizer<'_> {
         })
     }
 
-    /// Tells if some construct around ends at a block.
+    /// Reports whether an enclosing construct ends at a block.
     fn is_target(&self, block: usize) -> bool {
         self.end_of_construct(block).is_some() || self.jump(block).is_some()
     }
@@ -366,7 +366,7 @@ impl Structurizer<'_> {
         })
     }
 
-    /// A branch at the end of a list.
+    /// Adds a branch at the end of a list.
     fn follow(&mut self, from: usize, to: usize, nodes: &mut Vec<Node>) -> Result<Option<usize>> {
         let end = self
             .end_of_construct(to)
@@ -385,7 +385,7 @@ impl Structurizer<'_> {
         Ok(Some(to))
     }
 
-    /// The list of nodes that a branch leads to.
+    /// The nodes of a branch's arm.
     fn arm(&mut self, from: usize, to: usize) -> Result<Vec<Node>> {
         let mut nodes = Vec::new();
         if let Some(next) = self.follow(from, to, &mut nodes)? {
@@ -412,7 +412,7 @@ impl Structurizer<'_> {
         let Some(merge) = self.selection_merge(block)? else {
             return self.conditional_exit(block, condition, then, otherwise, nodes);
         };
-        // A merge block that ends an outer construct too is that construct's business.
+        // A merge block that also ends an outer construct belongs to that construct.
         let merge_point = (!self.is_target(merge)).then(|| self.add_merge_point());
         let construct = self.add_construct();
         if let Some(merge_point) = merge_point {
@@ -446,7 +446,7 @@ impl Structurizer<'_> {
             .map(|_| merge))
     }
 
-    /// A conditional branch without a merge block: at least one of its targets leaves a construct.
+    /// Adds a conditional branch without a merge block: at least one of its targets leaves a construct.
     fn conditional_exit(
         &mut self,
         block: usize,
@@ -475,7 +475,7 @@ impl Structurizer<'_> {
             nodes.push(node(Vec::new(), vec![edge], none));
             return self.follow(block, then, nodes);
         }
-        // One arm ends here and the other takes along the rest of the list, or they never meet again.
+        // Either one arm ends here and the other contains the rest of the list, or the two never join again.
         self.begin_modified();
         let then = self.arm(block, then)?;
         let otherwise = self.arm(block, otherwise)?;
@@ -603,7 +603,7 @@ impl Structurizer<'_> {
     }
 }
 
-/// The most blocks looked at while ordering the cases of switches.
+/// The most blocks visited while ordering the cases of switches.
 const MAX_STEPS: usize = 1 << 22;
 
 /// A target of a switch.
@@ -649,8 +649,8 @@ impl Structurizer<'_> {
         Ok(targets)
     }
 
-    /// The cases in an order in which each that falls through is followed by the one that it falls into; with each,
-    /// whether it does.
+    /// The cases in an order in which each that falls through is followed by its target. The flag is true for those
+    /// that do.
     fn order_cases(&mut self, merge: usize, cases: &[Target]) -> Result<Vec<(usize, bool)>> {
         let which: HashMap<usize, usize> = cases
             .iter()

@@ -33,10 +33,10 @@ fn group_op(opcode: Op, scalar: Scalar) -> Option<Ir> {
     Some(op_for_width(scalar, narrow, wide))
 }
 
-/// `OpGroupNonUniform*` and the older `OpSubgroup*KHR`.
+/// Translates `OpGroupNonUniform*` and the older `OpSubgroup*KHR`.
 pub fn subgroup(t: &mut Translator, it: &Instruction) -> Result<()> {
     let opcode = it.opcode;
-    // The newer instructions name a scope first.
+    // The newer instructions have a scope operand first.
     let khr = matches!(
         opcode,
         Op::SubgroupBallotKHR
@@ -155,7 +155,7 @@ fn ballot_operand(t: &mut Translator, it: &Instruction, index: usize) -> Result<
     }
 }
 
-/// A truth value: a bit of a ballot is set.
+/// A truth value: true if a bit of a ballot is set.
 fn ballot_bit(t: &mut Translator, words: &[Reg; 4], index: Reg) -> Reg {
     let (five, one, zero) = (t.emit.u32(5), t.emit.u32(1), t.emit.u32(0));
     let which = t.emit.op(Ir::UShr, &[index, five]);
@@ -227,7 +227,7 @@ fn ballot_find(t: &mut Translator, it: &Instruction) -> Result<()> {
     t.define(it, vec![found])
 }
 
-/// Reductions and scans.
+/// Translates reductions and scans.
 fn group_arithmetic(t: &mut Translator, it: &Instruction) -> Result<()> {
     let (scalar, regs) = t.vector(it.id(2)?)?;
     let Some(op) = group_op(it.opcode, scalar).filter(|op| is_reducible(*op)) else {
@@ -274,7 +274,7 @@ fn group_arithmetic(t: &mut Translator, it: &Instruction) -> Result<()> {
     t.define(it, reduced)
 }
 
-/// The least or greatest of no narrow integers: what 32 bits have for it, brought to the type's range.
+/// The identity of a minimum or maximum of narrow integers: the 32-bit identity clamped to the type's range.
 fn clamped(t: &mut Translator, scalar: Scalar, op: Ir, reg: Reg) -> Reg {
     let Scalar::Int {
         width: width @ (8 | 16),

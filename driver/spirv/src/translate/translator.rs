@@ -1,4 +1,4 @@
-//! The state of a translation: ids and their meanings, and the program that grows.
+//! The state of a translation: the meanings of ids, and the program under construction.
 
 use std::collections::HashMap;
 use std::rc::Rc;
@@ -31,7 +31,7 @@ pub struct Translator<'a> {
     pub promoted: PromotedVariables,
     pub interface: Interface,
     pub next_resource_slot: u32,
-    /// The place of the blocks in workgroup memory, once it is allocated.
+    /// The place of the blocks in workgroup memory, once allocated.
     pub workgroup_block: Option<u32>,
     pub values: HashMap<u32, Value>,
     /// Types of the ids in `values`.
@@ -73,7 +73,7 @@ impl Translator<'_> {
         malformed(format!("%{id} isn't defined before its use"))
     }
 
-    /// An undefined value of a type. Images, samplers and pointers lead nowhere: they read as zero.
+    /// An undefined value of a type. Undefined images, samplers and pointers read as zero.
     pub fn undefined(&mut self, ty: u32) -> Result<Value> {
         let index = self.emit.u32(0);
         let nowhere = Binding {
@@ -112,7 +112,7 @@ impl Translator<'_> {
         })
     }
 
-    /// The registers of a value; a pointer is one where its storage class allows it.
+    /// The registers of a value, or of a pointer if its storage class allows it.
     pub fn regs(&mut self, id: u32) -> Result<Rc<[Reg]>> {
         match self.value(id)? {
             Value::Regs(regs) => Ok(regs),
@@ -143,7 +143,7 @@ impl Translator<'_> {
         }
     }
 
-    /// Gives an instruction's result its registers, which must fit its type.
+    /// Sets the registers of an instruction's result, which must fit its type.
     pub fn define(&mut self, it: &Instruction, regs: Vec<Reg>) -> Result<()> {
         let (id, ty) = (it.result()?, it.ty()?);
         self.emit.charge_budget(regs.len())?;
@@ -161,7 +161,7 @@ impl Translator<'_> {
         Ok(())
     }
 
-    /// Gives an instruction's result a meaning.
+    /// Sets the meaning of an instruction's result.
     pub fn define_as(&mut self, it: &Instruction, value: Value) -> Result<()> {
         let id = it.result()?;
         self.values.insert(id, value);
@@ -169,7 +169,7 @@ impl Translator<'_> {
         Ok(())
     }
 
-    /// The pointer that an id stands for.
+    /// The pointer to which an id refers.
     pub fn pointer(&mut self, id: u32) -> Result<Pointer> {
         match self.value(id)? {
             Value::Pointer(pointer) => Ok((*pointer).clone()),
@@ -181,13 +181,13 @@ impl Translator<'_> {
         }
     }
 
-    /// Tells if an instruction's product and a sum may be fused.
+    /// Reports whether an instruction's product and sum may be fused.
     pub fn may_contract(&self, it: &Instruction) -> bool {
         let id = it.result_id.unwrap_or(0);
         !self.module.has(id, Decoration::NoContraction)
     }
 
-    /// Makes a variable of a type that is held in registers; returns its number.
+    /// Creates a variable of a type that is held in registers. Returns its number.
     pub fn promote(&mut self, ty: u32, input: Option<u32>) -> Result<usize> {
         let scalars: Rc<[Scalar]> = self.globals.types.flatten(ty)?.into();
         self.emit.charge_budget(scalars.len())?;
@@ -214,7 +214,7 @@ fn pointer_to_value(t: &mut Translator, pointer: &Pointer) -> Result<Rc<[Reg]>> 
     }
 }
 
-/// The pointer that registers stand for.
+/// The pointer that registers encode.
 fn pointer_from_value(t: &mut Translator, ty: u32, regs: &[Reg]) -> Result<Pointer> {
     let (class, pointee) = t.globals.types.pointer(ty)?;
     let at = |space, base, layout| {
@@ -251,7 +251,7 @@ fn pointer_from_value(t: &mut Translator, ty: u32, regs: &[Reg]) -> Result<Point
     }
 }
 
-/// Refuses a pointer whose type doesn't say how what it points to lies in memory.
+/// Refuses a variable pointer whose type doesn't determine the layout of its target.
 fn check_layout(t: &Translator, place: &MemoryRef) -> Result<()> {
     if place.layout.component_stride.is_some() {
         return unsupported("a variable pointer into a matrix whose rows are in order");
@@ -259,8 +259,8 @@ fn check_layout(t: &Translator, place: &MemoryRef) -> Result<()> {
     pointee_layout(t, place.ty, place.layout).map(|_| ())
 }
 
-/// The layout of what a variable pointer leads to. Only its type is known then: of a matrix, all members of its type must
-/// have one layout.
+/// The layout of the target of a variable pointer, of which only the type is known: all members of a matrix type must
+/// have the same layout.
 fn pointee_layout(t: &Translator, pointee: u32, layout: MemoryLayout) -> Result<MemoryLayout> {
     let Some(matrix) = t
         .globals
@@ -291,7 +291,7 @@ fn address(t: &mut Translator, place: &MemoryRef) -> Result<Reg> {
     Ok(t.emit.op(Ir::IAdd64, &[base, offset]))
 }
 
-/// The number of a descriptor's slot, counted from 1; 0 if there is no such descriptor.
+/// The slot number of a descriptor, counted from 1; 0 if there is no such descriptor.
 fn slot_number(t: &mut Translator, binding: Binding) -> Reg {
     let first = t.emit.u32(binding.slot + 1);
     match binding.index {
@@ -305,7 +305,7 @@ fn slot_number(t: &mut Translator, binding: Binding) -> Reg {
     }
 }
 
-/// Bytes from the start of a place's memory, and some more.
+/// The number of bytes from the start of a place's memory to the place, plus `more`.
 fn bytes_before(t: &mut Translator, place: &MemoryRef, more: u32) -> Reg {
     let constant = t.emit.u32(place.offset.saturating_add(more));
     match place.base {
@@ -324,7 +324,7 @@ pub fn workgroup_blocks(t: &Translator) -> impl Iterator<Item = u32> {
         .filter(|ty| t.module.has(*ty, Decoration::Block))
 }
 
-/// The layout of workgroup memory: explicit if an entry point's variables there are blocks, as then all are.
+/// The layout of workgroup memory: explicit if an entry point's workgroup variables are blocks, because then all are.
 pub fn workgroup_layout(t: &Translator) -> MemoryLayout {
     if workgroup_blocks(t).next().is_some() {
         EXPLICIT

@@ -44,13 +44,13 @@ pub enum Pointer {
     },
 }
 
-/// A move within a variable that is known at run time only.
+/// An index within a variable that is known only at run time.
 #[derive(Clone, Copy, Debug)]
 pub struct DynamicIndex {
     pub index: Reg,
-    /// Elements that it may pick.
+    /// The number of elements from which it selects.
     pub count: u32,
-    /// Scalars of an element.
+    /// The number of scalars in an element.
     pub scalars: u32,
 }
 
@@ -65,7 +65,7 @@ pub struct MemoryRef {
 }
 
 impl MemoryRef {
-    /// The address some bytes further on.
+    /// The address `bytes` further on.
     pub fn at(&self, bytes: u32) -> Address {
         Address {
             space: self.space,
@@ -78,11 +78,11 @@ impl MemoryRef {
 /// The layout of a value in memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MemoryLayout {
-    /// By decorations; otherwise scalars lie close together, each in a word or two.
+    /// True if decorations give the layout; otherwise scalars are packed, each in a word or two.
     pub explicit: bool,
-    /// The stride of matrices, and whether it is from row to row.
+    /// The stride of matrices, and true if it is from row to row.
     pub matrix: Option<(u32, bool)>,
-    /// Bytes between the components of a vector, if they aren't adjacent.
+    /// The bytes between the components of a vector, if they aren't adjacent.
     pub component_stride: Option<u32>,
 }
 

@@ -1,4 +1,4 @@
-//! An entry point's variables: their places in registers or memory, their initializers, and the outputs at the end.
+//! An entry point's variables: their storage in registers or memory, their initializers, and the outputs at the end.
 
 use isa::ir::{MAX_MEMORY_BYTES, Space};
 use spirv::{BuiltIn, Decoration, StorageClass};
@@ -13,7 +13,7 @@ use crate::globals::GlobalVariable;
 use crate::instruction::Instruction;
 use crate::types::Type;
 
-/// Tells if variables of a storage class may be held in registers.
+/// Reports whether variables of a storage class may be held in registers.
 fn is_in_registers(class: StorageClass) -> bool {
     matches!(
         class,
@@ -21,7 +21,7 @@ fn is_in_registers(class: StorageClass) -> bool {
     )
 }
 
-/// Makes all variables outside functions that are used, resource variables in order of set and binding.
+/// Creates all variables outside functions that are used, with resource variables in order of set and binding.
 pub fn global_variables(t: &mut Translator) -> Result<(), Error> {
     let mut used: Vec<u32> = t.analysis.used.iter().copied().collect();
     let number = |id, decoration| t.module.literal(id, decoration).unwrap_or(0);
@@ -100,7 +100,7 @@ fn global_variable(t: &mut Translator, id: u32) -> Result<Value> {
         }
         other => return unsupported(format!("a variable of storage class {other:?}")),
     };
-    // Workgroup memory begins as zero, which is the only initializer that it may have.
+    // Workgroup memory is zero at the beginning, which is the only initializer that it may have.
     if let Some(initializer) = variable.initializer
         && class != StorageClass::Workgroup
     {
@@ -112,7 +112,7 @@ fn global_variable(t: &mut Translator, id: u32) -> Result<Value> {
     Ok(value)
 }
 
-/// A variable in private memory; each variable once, however often its function is inlined.
+/// A variable in private memory. It is allocated once, however often its function is inlined.
 fn private_variable(t: &mut Translator, id: u32, pointee: u32) -> Result<Pointer> {
     if let Some(Value::Pointer(pointer)) = t.values.get(&id)
         && let Pointer::Memory(_) = **pointer
@@ -130,7 +130,7 @@ fn private_variable(t: &mut Translator, id: u32, pointee: u32) -> Result<Pointer
     }))
 }
 
-/// `OpVariable` in a function.
+/// Translates `OpVariable` in a function.
 pub fn local_variable(t: &mut Translator, it: &Instruction) -> Result<()> {
     let id = it.result()?;
     let (class, pointee) = t.globals.types.pointer(it.ty()?)?;
@@ -159,7 +159,7 @@ pub fn local_variable(t: &mut Translator, it: &Instruction) -> Result<()> {
     t.define_as(it, Value::Pointer(pointer.into()))
 }
 
-/// The place of the blocks in workgroup memory, which is one for all.
+/// The place of the blocks in workgroup memory, which they all share.
 fn workgroup_block(t: &mut Translator) -> Result<u32> {
     if let Some(offset) = t.workgroup_block {
         return Ok(offset);
@@ -177,7 +177,7 @@ fn tight_bytes(t: &Translator, ty: u32) -> Result<u32> {
     memory_bytes(t.globals.types.tight_size(ty)?)
 }
 
-/// A number of bytes that workgroup or private memory may have.
+/// Checks a number of bytes of workgroup or private memory.
 fn memory_bytes(size: u64) -> Result<u32> {
     match u32::try_from(size) {
         Ok(bytes) if bytes <= MAX_MEMORY_BYTES => Ok(bytes),
@@ -188,8 +188,8 @@ fn memory_bytes(size: u64) -> Result<u32> {
     }
 }
 
-/// Computes the scalars of an input that aren't simply given. That is done before anything else, so that they exist
-/// wherever they are read.
+/// Computes the scalars of an input that isn't a plain register. They are computed before anything else, so that they
+/// are defined wherever they are read.
 fn compute_inputs(t: &mut Translator, id: u32) -> Result<()> {
     let Some(variable) = t.promoted.find(id) else {
         return Ok(());
@@ -205,8 +205,8 @@ fn compute_inputs(t: &mut Translator, id: u32) -> Result<()> {
     Ok(())
 }
 
-/// Tells if code names an input that differs from sample to sample. That it may never run changes nothing: such an input
-/// asks for a run for each sample.
+/// Reports whether code names an input that differs between samples. Such an input requires a run for each sample, even
+/// if the code never runs.
 pub fn names_a_sample(t: &Translator) -> bool {
     let is_of_sample =
         |built_in| matches!(built_in, Some(BuiltIn::SampleId | BuiltIn::SamplePosition));
@@ -226,7 +226,7 @@ pub fn names_a_sample(t: &Translator) -> bool {
     })
 }
 
-/// Assigns what was stored to the output variables.
+/// Assigns the stored values to the output variables.
 pub fn assign_outputs(t: &mut Translator) -> Result<()> {
     let mut outputs: Vec<u32> = t.analysis.used.iter().copied().collect();
     outputs.retain(|id| {
@@ -252,7 +252,7 @@ pub fn assign_outputs(t: &mut Translator) -> Result<()> {
     Ok(())
 }
 
-/// Notes in the interface which push constants are declared.
+/// Records the declared push constants in the interface.
 pub fn declare_push_constants(t: &mut Translator) {
     for id in &t.analysis.used {
         let Some(variable) = t.globals.variables.get(id) else {

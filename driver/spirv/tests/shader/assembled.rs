@@ -1,5 +1,5 @@
-//! Shaders run on the shader cores, most in SPIR-V's assembly: what GLSL has no words for. Each row of results is
-//! compared with what the host computes.
+//! Tests of shaders on the shader cores, most of them in SPIR-V assembly because GLSL can't express them. Each row of
+//! results is compared with the host's.
 
 use crate::common::{Dispatch, Random, buffer, contents, translated, words_of};
 use devmem::BufferRange;
@@ -76,7 +76,7 @@ fn extended_arithmetic_of_all_widths() {
                 _ => product.cast_unsigned(),
             };
             let expected = low(whole >> (width * (index as u32 % 2)), width);
-            // What is kept of a signed result beyond its width is not looked at.
+            // The bits of a signed result beyond its width are ignored.
             assert_eq!(
                 low(u128::from(*found), width),
                 expected,
@@ -246,7 +246,7 @@ fn pointers_are_chosen_at_run_time() {
         let corners = if is_odd { 12 + 13 } else { 4 + 5 };
         assert_eq!(row(7)[at], corners, "matrix, lane {at}");
     }
-    // A pointer may lead to any of them.
+    // A pointer may point to any of them.
     let writable = shader.interface.descriptors.iter().map(|it| it.writable);
     assert!(writable.eq([true; 4]));
 }
@@ -346,7 +346,7 @@ fn descriptor_arrays_without_a_length_need_their_capability() {
     );
 }
 
-/// The capabilities of Vulkan 1.3 that need no feature.
+/// Tests the capabilities of Vulkan 1.3 that need no feature.
 #[gaurast_runner::test]
 fn capabilities_that_need_no_feature_are_accepted() {
     use spirv::Capability as C;

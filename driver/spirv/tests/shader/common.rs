@@ -19,7 +19,7 @@ pub fn folder() -> PathBuf {
         .collect()
 }
 
-/// The checked-in SPIR-V of a shader; with `.opt` after its name, as spirv-opt rewrote it.
+/// The checked-in SPIR-V of a shader; with `.opt` after its name, spirv-opt's output.
 pub fn words_of(name: &str) -> Vec<u32> {
     let bytes = std::fs::read(folder().join(format!("{name}.spv"))).unwrap();
     bytes
@@ -28,7 +28,7 @@ pub fn words_of(name: &str) -> Vec<u32> {
         .collect()
 }
 
-/// The stage that a shader's file name says.
+/// The stage in a shader's file name.
 pub fn stage_of(name: &str) -> Stage {
     match name.rsplit('.').next() {
         Some("vert") => Stage::Vertex,
@@ -37,7 +37,7 @@ pub fn stage_of(name: &str) -> Stage {
     }
 }
 
-/// The names of all shaders that are kept.
+/// The names of all checked-in shaders.
 pub fn all_shaders() -> Vec<String> {
     let mut names: Vec<String> = std::fs::read_dir(folder())
         .unwrap()
@@ -48,14 +48,14 @@ pub fn all_shaders() -> Vec<String> {
     names
 }
 
-/// Subgroups as the tests run them.
+/// The options of the tests' translations.
 pub const OPTIONS: Options = Options {
     subgroup_size: 16,
     samples: 4,
     unsized_descriptors: 1,
 };
 
-/// Translates a kept shader.
+/// Translates a checked-in shader.
 pub fn translated(name: &str, specialization: &Specialization) -> Shader {
     let module = Module::parse(&words_of(name)).unwrap();
     translate(&module, "main", stage_of(name), specialization, &OPTIONS)

@@ -1,11 +1,11 @@
-//! Kept compute shaders run on the shader cores and give what the host computes: as they were compiled, and as spirv-opt
-//! rewrote them (phis in place of variables, merged and unrolled blocks).
+//! Tests of checked-in compute shaders on the shader cores, whose results must equal the host's: as compiled, and as
+//! optimized by spirv-opt (phis instead of variables, merged and unrolled blocks).
 
 use crate::common::{self, Dispatch, Random, buffer, contents, float_contents, floats};
 use gaurast_runner::{Case, Variant};
 use gaurast_spirv::{Shader, Specialization};
 
-/// The variant that runs what spirv-opt made of a shader.
+/// The variant that runs spirv-opt's output.
 const OPTIMIZED: &str = "optimized";
 
 /// A variant for each binary of a shader.

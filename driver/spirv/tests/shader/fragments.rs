@@ -1,4 +1,4 @@
-//! Fragment shaders run on the shader cores, four quads of them.
+//! Tests of fragment shaders on the shader cores, on four quads.
 
 use std::sync::Arc;
 
@@ -58,16 +58,16 @@ fn run(shader: &Shader, input: impl Fn(InputSource, usize) -> u32) -> Vec<[[f32;
     outputs
 }
 
-/// A varying at a point: linear in the framebuffer.
+/// The value of a varying at a point, linear in the framebuffer.
 fn varying(location: u32, component: u32, [x, y]: [f32; 2]) -> f32 {
     let (location, component) = (location as f32, component as f32);
     100.0 * location + 10.0 * component + (location + 1.0) * x - (component + 1.0) * y
 }
 
-/// Added to inputs at the centroid.
+/// The offset added to inputs at the centroid.
 const AT_CENTROID: f32 = 5000.0;
 
-/// The element that a lane chooses: it differs within quads.
+/// The element that a lane selects: it differs within quads.
 fn chosen(lane: usize) -> usize {
     (5 * lane + 2) % 6
 }
@@ -151,7 +151,7 @@ fn check_chosen_inputs(shader: &Shader, own: [f32; 2]) {
 fn chosen_inputs_are_interpolated_elsewhere() {
     let shader = translated("chosen_inputs.frag", &Specialization::default());
     check_chosen_inputs(&shader, [0.5, 0.5]);
-    // Where each sample is shaded, offsets are from the pixel's centre all the same.
+    // If each sample is shaded, offsets are still relative to the pixel's centre.
     check_chosen_inputs(&shader, [0.875, 0.375]);
 }
 

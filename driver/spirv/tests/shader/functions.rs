@@ -1,11 +1,11 @@
-//! Functions of GLSL.std.450 against f64 or exact models, within the precision that Vulkan asks for.
+//! Tests of functions of GLSL.std.450 against f64 or exact models, within the precision that Vulkan requires.
 
 use crate::common::{
     Dispatch, OPTIONS, Random, buffer, contents, float_contents, translated, words_of,
 };
 use gaurast_spirv::{Module, Shader, Specialization, Stage, translate};
 
-/// The distance that a result may have from the model's.
+/// The allowed difference between a result and the model's.
 #[derive(Clone, Copy)]
 enum Tolerance {
     Exact,
@@ -43,7 +43,8 @@ fn determinant(m: &[Vec<f64>]) -> f64 {
         .sum()
 }
 
-/// sinh(log(x)) and the like have the error of what they are derived from; this table has Vulkan's bounds.
+/// The functions, with their models and Vulkan's tolerances. sinh(log(x)) and the like have the error of the functions
+/// that they are derived from.
 const FLOATS: &[(&str, Model, Tolerance)] = &[
     ("round", |x, _, _| x.round_ties_even(), Exact),
     ("roundEven", |x, _, _| x.round_ties_even(), Exact),
@@ -174,7 +175,7 @@ fn refracted(x: f64, y: f64, _: f64) -> f64 {
     0.5 * x - (0.5 * along + k.sqrt()) * 0.6
 }
 
-/// Column 1, row 2 of the inverse of the shader's matrix, whose columns are given here.
+/// Element (row 2, column 1) of the inverse of the shader's matrix, whose columns are in the function.
 fn inverse_1_2(x: f64, y: f64, z: f64) -> f64 {
     let columns = [[x + 20.0, y, z], [1.0, y + 30.0, 2.0], [x, 1.0, 25.0]];
     let transposed: Vec<Vec<f64>> = (0..3)
@@ -295,7 +296,7 @@ fn inverses_of_halves_are_rounded_once() {
     .run()
     .unwrap();
     let (inverses, determinants) = (float_contents(&inverses), float_contents(&determinants));
-    // Half a unit in the last place of a half, and what binary32 adds to it.
+    // Half a unit in the last place of a half, plus the error of binary32.
     let close = |found: f32, exact: f64, what: &str| {
         let unit = (exact.abs().log2().floor().max(-14.0) - 10.0).exp2();
         let error = (f64::from(found) - exact).abs();

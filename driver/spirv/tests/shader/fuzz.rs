@@ -1,4 +1,4 @@
-//! Mutated modules: whatever their words are, they are translated or refused, without a panic and in bounded time.
+//! Tests of mutated modules: any words are translated or refused, without a panic and in bounded time.
 
 use std::time::{Duration, Instant};
 
@@ -9,7 +9,7 @@ use gaurast_spirv::{Module, Specialization, translate};
 use isa::Options as ExecOptions;
 use isa::machine::Executable;
 
-/// Translates if it can, and prepares what comes of it for the device. Returns whether that worked.
+/// Translates a module if it can, and compiles the program for the device. Returns true if that worked.
 fn attempt(name: &str, words: &[u32]) -> bool {
     let Ok(module) = Module::parse(words) else {
         return false;
@@ -57,9 +57,9 @@ fn mutate(random: &mut Random, original: &[u32]) -> Vec<u32> {
                     _ => random.below(bound) as u32,
                 };
             }
-            // Another opcode.
+            // Replaces the opcode.
             4 => words[start] = words[start] & 0xffff_0000 | random.below(460) as u32,
-            // An instruction vanishes, is doubled, or moves.
+            // Removes, duplicates or moves an instruction.
             5 => drop(words.drain(start..start + count)),
             6 => {
                 let copy = words[start..start + count].to_vec();

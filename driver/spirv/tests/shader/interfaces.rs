@@ -1,5 +1,5 @@
-//! Interfaces of translated shaders: inputs, outputs, descriptors, push constants; and the entry point that
-//! spirv-reflect sees.
+//! Tests of the interfaces of translated shaders: inputs, outputs, descriptors, push constants; and of the entry point
+//! that spirv-reflect finds.
 
 use std::sync::Arc;
 

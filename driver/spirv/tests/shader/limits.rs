@@ -1,4 +1,5 @@
-//! Modules built to be too much: nesting, recursion, calls and sizes are refused with a reason, on a small stack.
+//! Tests of modules that exceed limits: nesting, recursion, calls and sizes are refused with a reason, on a small
+//! stack.
 
 use crate::common::OPTIONS;
 use gaurast_spirv::{Error, Module, Shader, Specialization, Stage, translate};
@@ -6,14 +7,14 @@ use spirv::{
     AddressingModel, Capability, ExecutionMode, ExecutionModel, MAGIC_NUMBER, MemoryModel, Op,
 };
 
-// Ids that all modules have: the types of void, of a function and of bool, and the constant that means a subgroup.
+// The ids of all modules: the types of void, of a function and of bool, and the constant of the subgroup scope.
 const VOID: u32 = 1;
 const FUNCTION: u32 = 2;
 const BOOL: u32 = 3;
 const UINT: u32 = 4;
 const SUBGROUP: u32 = 5;
 
-/// Instructions in the making.
+/// A module under construction.
 struct Builder {
     words: Vec<u32>,
     next_id: u32,
@@ -31,7 +32,7 @@ impl Builder {
         self.words.extend_from_slice(operands);
     }
 
-    /// Begins a function; returns its id.
+    /// Begins a function. Returns its id.
     fn begin(&mut self) -> u32 {
         let (function, label) = (self.id(), self.id());
         self.op(Op::Function, &[VOID, function, 0, FUNCTION]);
@@ -49,7 +50,7 @@ impl Builder {
         self.op(Op::FunctionCall, &[VOID, result, callee]);
     }
 
-    /// Opens and closes nested selections, innermost first closed, with something within.
+    /// Emits `depth` nested selections, with the instructions of `within` in the innermost.
     fn nest(&mut self, depth: usize, within: impl FnOnce(&mut Self)) {
         let condition = self.id();
         self.op(Op::GroupNonUniformElect, &[BOOL, condition, SUBGROUP]);
@@ -69,7 +70,7 @@ impl Builder {
     }
 }
 
-/// A module whose functions `body` makes; it returns the one of the entry point.
+/// A module whose functions `body` emits; `body` returns the id of the entry point's function.
 fn module(body: impl FnOnce(&mut Builder) -> u32) -> Vec<u32> {
     let mut functions = Builder {
         words: Vec::new(),
@@ -164,7 +165,7 @@ fn recursion_is_refused() {
 
 #[gaurast_runner::test]
 fn calls_that_multiply_are_refused() {
-    // Thirty functions that each call the one before four times: 4^30 calls, which nobody would see the end of.
+    // Thirty functions that each call the one before four times: 4^30 calls, far too many to translate.
     let words = module(|b| {
         let mut callee = None;
         for _ in 0..30 {

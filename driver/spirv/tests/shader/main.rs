@@ -1,4 +1,4 @@
-//! The translation of SPIR-V to programs of the shader cores, and what those compute.
+//! Tests of the translation of SPIR-V to programs of the shader cores, and of the programs' results.
 
 mod assembled;
 mod common;

@@ -1,4 +1,4 @@
-//! All kept shaders translate; what is kept is what their sources compile to.
+//! Tests that all checked-in shaders can be translated, and that they are up to date with their sources.
 
 use std::path::Path;
 use std::process::Command;
@@ -26,7 +26,7 @@ fn comparable(bytes: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// A program that made the kept binaries, and how it names the version that made them.
+/// A program that made the checked-in binaries, and its version.
 struct Tool {
     program: &'static str,
     version: &'static str,
@@ -50,13 +50,13 @@ impl Tool {
         Need::Program(self.program)
     }
 
-    /// Ends the test as ignored where the program is of another version, which may compile otherwise.
+    /// Ends the test as ignored if the program has another version, whose output may differ.
     fn require_version(&self) {
         let output = Command::new(self.program)
             .arg("--version")
             .output()
             .unwrap();
-        // spirv-opt tells it on the standard error.
+        // spirv-opt prints it to standard error.
         let text =
             String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
         if !text.contains(self.version) {
@@ -66,7 +66,7 @@ impl Tool {
         }
     }
 
-    /// Runs the program, which must succeed, and returns what it wrote to a file of its own.
+    /// Runs the program, which must succeed. Returns the contents of its output file.
     fn output(&self, arguments: &[&str], input: &Path) -> Vec<u8> {
         let file = tempfile::NamedTempFile::new().unwrap();
         let output = Command::new(self.program)
@@ -82,7 +82,7 @@ impl Tool {
     }
 }
 
-/// The file of a shader in SPIR-V's assembly, if it is written in that.
+/// The assembly file of a shader, if it is written in assembly.
 fn assembly(name: &str) -> Option<std::path::PathBuf> {
     let path = folder().join(format!("{name}.spvasm"));
     path.exists().then_some(path)
@@ -96,7 +96,7 @@ fn compiled(name: &str) -> Vec<u8> {
     COMPILER.output(&["-V", "--target-env", "vulkan1.3"], &folder().join(name))
 }
 
-/// Asserts that a kept binary is `fresh`.
+/// Asserts that a checked-in binary equals `fresh`.
 fn assert_kept(name: &str, fresh: &[u8]) {
     let kept = std::fs::read(folder().join(format!("{name}.spv"))).unwrap();
     assert!(
@@ -131,7 +131,7 @@ fn kept_optimized_binaries_match_their_sources() {
     }
 }
 
-/// Disassemblies that are kept, to be looked at when the translation changes.
+/// Shaders whose disassemblies are checked in, to be reviewed when the translation changes.
 const KEPT: [&str; 3] = ["triangle.vert", "mandelbrot.comp", "matrix_product.comp"];
 
 #[gaurast_runner::test]
