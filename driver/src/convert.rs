@@ -1,4 +1,5 @@
-//! Vulkan's values as the device's: enumerations, rectangles, clear values, strings. Nothing else converts them.
+//! Conversion of Vulkan's values to the device's: enumerations, rectangles, clear values, strings. It happens only
+//! here.
 
 use crate::abi::error::Error;
 use ash::vk;
@@ -13,17 +14,17 @@ use simdevice::texture::{
 };
 use std::ffi::{CStr, c_char};
 
-/// A value that is none of an enumeration's.
+/// The error of a value that an enumeration doesn't have.
 fn unknown(vuid: &'static str, value: &dyn std::fmt::Debug) -> Error {
     Error::usage(vuid, format!("{value:?} is not a value of its enumeration"))
 }
 
-/// The error of a value that the device lacks.
+/// The error of a value that the device doesn't support.
 fn lacking(what: &dyn std::fmt::Debug, feature: &str) -> Error {
     Error::FeatureNotPresent(format!("{what:?} (feature {feature})"))
 }
 
-/// The topology by which vertices make primitives.
+/// The device's topology.
 ///
 /// # Errors
 /// [`Error::FeatureNotPresent`] for topologies that only geometry and tessellation stages take.
@@ -48,7 +49,7 @@ pub(crate) fn topology(topology: vk::PrimitiveTopology) -> Result<Topology, Erro
     }
 }
 
-/// The part of polygons that is drawn.
+/// The device's polygon mode.
 ///
 /// # Errors
 /// [`Error::FeatureNotPresent`] for modes of extensions.
@@ -61,10 +62,10 @@ pub(crate) fn polygon_mode(mode: vk::PolygonMode) -> Result<PolygonMode, Error> 
     }
 }
 
-/// A comparison.
+/// The device's comparison.
 ///
 /// # Errors
-/// [`Error::InvalidUsage`] with the id `vuid` for a value that is none.
+/// [`Error::InvalidUsage`] with the id `vuid` for an unknown value.
 pub(crate) fn compare_op(op: vk::CompareOp, vuid: &'static str) -> Result<CompareOp, Error> {
     match op {
         vk::CompareOp::NEVER => Ok(CompareOp::Never),
@@ -79,10 +80,9 @@ pub(crate) fn compare_op(op: vk::CompareOp, vuid: &'static str) -> Result<Compar
     }
 }
 
-/// The operation on a stencil value.
+/// The device's stencil operation.
 ///
-/// # Errors
-/// [`Error::InvalidUsage`] with the id `vuid` for a value that is none.
+/// # Errors [`Error::InvalidUsage`] with the id `vuid` for an unknown value.
 pub(crate) fn stencil_op(op: vk::StencilOp, vuid: &'static str) -> Result<StencilOp, Error> {
     match op {
         vk::StencilOp::KEEP => Ok(StencilOp::Keep),
@@ -100,30 +100,30 @@ pub(crate) fn stencil_op(op: vk::StencilOp, vuid: &'static str) -> Result<Stenci
 /// The stencil operations of one face.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct StencilOps {
-    /// When the stencil test fails.
+    /// The operation if the stencil test fails.
     pub(crate) fail: StencilOp,
-    /// When both tests pass.
+    /// The operation if both tests pass.
     pub(crate) pass: StencilOp,
-    /// When only the depth test fails.
+    /// The operation if only the depth test fails.
     pub(crate) depth_fail: StencilOp,
     /// The comparison.
     pub(crate) compare: CompareOp,
 }
 
-/// The ids of the rules that stencil operations are values of their enumerations.
+/// The ids of the rules that stencil operations are valid values.
 pub(crate) struct StencilOpIds {
-    /// That of the operation when the stencil test fails.
+    /// The id for the operation if the stencil test fails.
     pub(crate) fail: &'static str,
-    /// That of the operation when both tests pass.
+    /// The id for the operation if both tests pass.
     pub(crate) pass: &'static str,
-    /// That of the operation when only the depth test fails.
+    /// The id for the operation if only the depth test fails.
     pub(crate) depth_fail: &'static str,
-    /// That of the comparison.
+    /// The id for the comparison.
     pub(crate) compare: &'static str,
 }
 
 impl StencilOps {
-    /// Makes them those of a face.
+    /// Sets the operations of a face.
     pub(crate) fn set(self, face: &mut StencilFace) {
         face.fail = self.fail;
         face.pass = self.pass;
@@ -131,10 +131,9 @@ impl StencilOps {
         face.compare = self.compare;
     }
 
-    /// The operations for the device.
+    /// The device's operations.
     ///
-    /// # Errors
-    /// [`Error::InvalidUsage`] for values that are none.
+    /// # Errors [`Error::InvalidUsage`] for unknown values.
     pub(crate) fn from_vk(
         fail: vk::StencilOp,
         pass: vk::StencilOp,
@@ -151,10 +150,9 @@ impl StencilOps {
     }
 }
 
-/// A logic operation.
+/// The device's logic operation.
 ///
-/// # Errors
-/// [`Error::InvalidUsage`] for what is none.
+/// # Errors [`Error::InvalidUsage`] for an unknown value.
 pub(crate) fn logic_op(op: vk::LogicOp) -> Result<LogicOp, Error> {
     match op {
         vk::LogicOp::CLEAR => Ok(LogicOp::Clear),
@@ -180,10 +178,9 @@ pub(crate) fn logic_op(op: vk::LogicOp) -> Result<LogicOp, Error> {
     }
 }
 
-/// The equations of an attachment's colour and alpha.
+/// The blend equations of an attachment's colour and alpha.
 ///
-/// # Errors
-/// An [`Error`] for factors and operations that Vulkan does not have.
+/// # Errors Returns an [`Error`] for unknown factors and operations.
 pub(crate) fn blend_equations(
     state: &vk::PipelineColorBlendAttachmentState,
 ) -> Result<(BlendEquation, BlendEquation), Error> {
@@ -208,7 +205,7 @@ pub(crate) fn blend_equations(
     Ok((color, alpha))
 }
 
-/// The bits of a mask of components: 0 to 3 are red, green, blue and alpha.
+/// The bits of a component mask: 0 to 3 are red, green, blue and alpha.
 pub(crate) fn write_mask(mask: vk::ColorComponentFlags) -> u8 {
     (mask.as_raw() & 0xf) as u8
 }
@@ -284,7 +281,7 @@ pub(crate) fn filter(filter: vk::Filter) -> Result<Filter, Error> {
     }
 }
 
-/// A choice between mip levels.
+/// The device's mipmap mode.
 pub(crate) fn mipmap_mode(mode: vk::SamplerMipmapMode) -> MipmapMode {
     match mode {
         vk::SamplerMipmapMode::LINEAR => MipmapMode::Linear,
@@ -292,7 +289,7 @@ pub(crate) fn mipmap_mode(mode: vk::SamplerMipmapMode) -> MipmapMode {
     }
 }
 
-/// The texels beyond an image's edge.
+/// The device's address mode.
 ///
 /// # Errors
 /// [`Error::FeatureNotPresent`] for modes of extensions.
@@ -307,7 +304,7 @@ pub(crate) fn address_mode(mode: vk::SamplerAddressMode) -> Result<AddressMode, 
     }
 }
 
-/// A border colour.
+/// The device's border colour.
 ///
 /// # Errors
 /// [`Error::FeatureNotPresent`] for colours of extensions.
@@ -324,13 +321,13 @@ pub(crate) fn border_color(color: vk::BorderColor) -> Result<BorderColor, Error>
     }
 }
 
-/// A border colour of the application's own: the bits of its components.
+/// The device's form of a custom border colour: the bits of its components.
 pub(crate) fn custom_border_color(color: vk::ClearColorValue) -> BorderColor {
     // SAFETY: every member of the union is sixteen bytes of plain data.
     BorderColor(unsafe { color.uint32 })
 }
 
-/// What becomes of the texels that are filtered together.
+/// The device's reduction of the filtered texels: their weighted average, minimum or maximum.
 ///
 /// # Errors
 /// [`Error::FeatureNotPresent`] for modes of extensions.
@@ -345,7 +342,7 @@ pub(crate) fn reduction(mode: vk::SamplerReductionMode) -> Result<Reduction, Err
     }
 }
 
-/// The aspect that shaders read of a view.
+/// The aspect of a view that shaders read.
 pub(crate) fn view_aspect(mask: vk::ImageAspectFlags) -> Aspect {
     if mask.contains(vk::ImageAspectFlags::DEPTH) {
         Aspect::Depth
@@ -356,7 +353,7 @@ pub(crate) fn view_aspect(mask: vk::ImageAspectFlags) -> Aspect {
     }
 }
 
-/// A component mapping for the device.
+/// The device's component mapping.
 pub(crate) fn swizzle(mapping: vk::ComponentMapping) -> Swizzle {
     let components = [mapping.r, mapping.g, mapping.b, mapping.a];
     std::array::from_fn(|index| match components[index] {
@@ -370,7 +367,7 @@ pub(crate) fn swizzle(mapping: vk::ComponentMapping) -> Swizzle {
     })
 }
 
-/// The aspects of a mask, if a format has all of them.
+/// The aspects of a mask; None if a format lacks one of them.
 pub(crate) fn aspects(format: Format, mask: vk::ImageAspectFlags) -> Option<Vec<Aspect>> {
     let named = [
         (vk::ImageAspectFlags::COLOR, Aspect::Color),
@@ -446,7 +443,7 @@ pub(crate) fn clear_value(format: Format, value: vk::ClearValue) -> ClearValue {
     }
 }
 
-/// The mode in which samples become one, if they do.
+/// The device's resolve mode; None if samples are not resolved.
 ///
 /// # Errors
 /// [`Error::InvalidUsage`] for modes that Vulkan does not have.
@@ -474,7 +471,7 @@ pub(crate) fn extent(extent: vk::Extent3D) -> [u32; 3] {
     [extent.width, extent.height, extent.depth]
 }
 
-/// Writes a name into a fixed array of a Vulkan structure, cut off where it doesn't fit.
+/// Writes a name into a fixed array of a Vulkan structure, and truncates it if necessary.
 pub(crate) fn write_string(array: &mut [c_char], text: &CStr) {
     let length = array.len().saturating_sub(1);
     for (place, &byte) in array.iter_mut().take(length).zip(text.to_bytes()) {

@@ -18,7 +18,7 @@ use std::collections::HashMap;
 use std::ffi::CStr;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-/// A logical device over a simulated device of its own.
+/// A logical device with a simulated device of its own.
 pub(crate) struct Device {
     instance: Arc<Instance>,
     extensions: Vec<&'static CStr>,
@@ -28,7 +28,7 @@ pub(crate) struct Device {
     sync: Arc<DeviceSync>,
     heap: Arc<Heap>,
     addresses: Arc<Addresses>,
-    /// Its queues, and the family of each.
+    /// Its queues, each with its family.
     queues: OnceLock<Vec<(u32, vk::Queue)>>,
 }
 
@@ -44,8 +44,8 @@ objects! {
 impl Device {
     /// Opens a device with a queue of each of these families.
     ///
-    /// # Errors
-    /// [`Error::InitializationFailed`] if the host gives no thread for a queue, or the environment makes no sense.
+    /// # Errors [`Error::InitializationFailed`] if the host can't start a queue's thread, or an environment variable is
+    /// invalid.
     pub(crate) fn new(
         instance: Arc<Instance>,
         extensions: Vec<&'static CStr>,
@@ -93,17 +93,17 @@ impl Device {
         &self.simulated
     }
 
-    /// Tells if the device's programs are printed as pipelines are created.
+    /// Reports whether the device's programs are printed when pipelines are created.
     pub(crate) fn dumps_ir(&self) -> bool {
         self.dump.ir
     }
 
-    /// The things that are waited for on it, and its loss.
+    /// The state that can be waited for on it, and its loss.
     pub(crate) fn sync(&self) -> &Arc<DeviceSync> {
         &self.sync
     }
 
-    /// The heap of a memory type and whether the host may map memory of it; `None` if there is no such type.
+    /// The heap of a memory type, and true if the host may map its memory; `None` if there is no such type.
     pub(crate) fn memory_type(&self, index: u32) -> Option<(&Arc<Heap>, bool)> {
         let properties = memory::type_properties(index)?;
         let host_visible = properties.contains(vk::MemoryPropertyFlags::HOST_VISIBLE);
@@ -136,7 +136,7 @@ impl Device {
         }
     }
 
-    /// Executes what its queues were given and joins their threads.
+    /// Executes the work of its queues and joins their threads.
     pub(crate) fn stop(&self) {
         for queue in self.queues() {
             // SAFETY: the handle was made with the device and lives as long.
@@ -147,7 +147,7 @@ impl Device {
         }
     }
 
-    /// Its instance.
+    /// The instance.
     pub(crate) fn instance(&self) -> &Arc<Instance> {
         &self.instance
     }
@@ -164,7 +164,7 @@ impl Drop for Device {
     }
 }
 
-/// The features that `vkCreateDevice` was asked to enable, together with `extensions`.
+/// The features that the application asks `vkCreateDevice` to enable, with `extensions`.
 ///
 /// # Errors
 /// [`Error::FeatureNotPresent`] names the first feature that isn't supported, [`Error::InvalidUsage`] one whose extension
@@ -195,7 +195,7 @@ unsafe fn requested_features(
     Ok(enabled)
 }
 
-/// Refuses features that don't work.
+/// Refuses features that are not supported.
 fn require_supported(requested: &Features) -> Result<(), Error> {
     let supported = SUPPORTED.list();
     match requested
@@ -229,25 +229,26 @@ fn require_extension(
     }
 }
 
-/// A slot: one value per object, by the serial number of its handle. Values stay until the slot is destroyed.
+/// A private data slot: one value per object, by the serial number of its handle. Values stay until the slot is
+/// destroyed.
 #[derive(Default)]
 pub(crate) struct PrivateDataSlot(Mutex<HashMap<u64, u64>>);
 
 impl PrivateDataSlot {
-    /// Attaches a value to the object.
+    /// Attaches a value to an object.
     pub(crate) fn set(&self, object: u64, data: u64) {
         let mut values = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         values.insert(object, data);
     }
 
-    /// The value attached to the object, or 0.
+    /// The value attached to an object, or 0.
     pub(crate) fn get(&self, object: u64) -> u64 {
         let values = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         values.get(&object).copied().unwrap_or(0)
     }
 }
 
-/// The families of the queues that are asked for, one for each queue.
+/// The families of the requested queues, one for each queue.
 ///
 /// # Safety
 /// The creation info is valid.
@@ -344,13 +345,13 @@ pub(crate) fn device_wait_idle(device: &Device) -> Result<(), Error> {
     })
 }
 
-/// A group has one device, which is no peer of itself.
+/// Returns no features: a group has one device, which has no peer.
 #[doc(alias = "vkGetDeviceGroupPeerMemoryFeatures")]
 pub(crate) fn get_device_group_peer_memory_features() -> Result<vk::PeerMemoryFeatureFlags, Error> {
     Ok(vk::PeerMemoryFeatureFlags::empty())
 }
 
-/// Counters are always on and nobody else has them, so there is nothing to wait for.
+/// Does nothing: counters are always on and shared by nobody.
 #[doc(alias = "vkAcquireProfilingLockKHR")]
 pub(crate) fn acquire_profiling_lock(_device: &Device) -> Result<(), Error> {
     Ok(())
@@ -397,10 +398,10 @@ mod tests {
     use gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST;
     use std::collections::HashMap;
 
-    /// Features that Vulkan 1.3 requires of an implementation and that don't work yet; `driver/support.toml` says why.
+    /// Features that Vulkan 1.3 requires and that are not supported; `driver/support.toml` has the reasons.
     const REQUIRED_BUT_MISSING: &[&str] = &[];
 
-    /// Counts the features that work of a structure.
+    /// The number of supported features of a structure.
     fn count<T: vk::TaggedStructure + Default>() -> usize {
         let mut structure = T::default();
         let mut head = vk::PhysicalDeviceFeatures2 {

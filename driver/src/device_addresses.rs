@@ -1,18 +1,18 @@
-//! Device addresses of buffers: numbers that no host pointer hides behind. What programs reach by them is looked up among the
-//! buffers that live, and bounded by theirs.
+//! Device addresses of buffers: numbers that are unrelated to host pointers. An access by a program is looked up among
+//! the live buffers, and bounded by the buffer that it finds.
 
 use simdevice::packet::BufferRange;
 use simdevice::program::bindings::AddressTable;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// The first address; null and what is near it are none.
+/// The first address. Null and addresses near it belong to no buffer.
 const FIRST: u64 = 1 << 32;
 
-/// Buffers begin at multiples of this, and none within so many bytes of another's end.
+/// The alignment of buffers' addresses, and the least distance from one buffer's end to the next.
 const GAP: u64 = 1 << 16;
 
-/// The addresses of a device's buffers. None is given twice.
+/// The addresses of a device's buffers. No address is used twice.
 #[derive(Debug)]
 pub(crate) struct Addresses(Mutex<Given>);
 
@@ -20,7 +20,7 @@ pub(crate) struct Addresses(Mutex<Given>);
 struct Given {
     next: u64,
     buffers: BTreeMap<u64, BufferRange>,
-    /// What programs look addresses up in, until a buffer comes or goes.
+    /// The table in which programs look up addresses; None after a buffer was added or removed.
     table: Option<Arc<AddressTable>>,
 }
 
@@ -39,7 +39,7 @@ impl Addresses {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Gives a buffer's bytes an address.
+    /// Assigns an address to a buffer's bytes.
     pub(crate) fn add(&self, range: BufferRange) -> u64 {
         let mut given = self.lock();
         let address = given.next;
@@ -50,14 +50,14 @@ impl Addresses {
         address
     }
 
-    /// Takes an address back.
+    /// Removes the buffer at an address.
     pub(crate) fn remove(&self, address: u64) {
         let mut given = self.lock();
         given.buffers.remove(&address);
         given.table = None;
     }
 
-    /// The buffers as they are now.
+    /// The table of the present buffers.
     pub(crate) fn table(&self) -> Arc<AddressTable> {
         let mut given = self.lock();
         if let Some(table) = &given.table {

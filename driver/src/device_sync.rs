@@ -1,13 +1,13 @@
-//! What hosts and queue threads wait for: fences, semaphores and events of a device share one lock and one
-//! condition, so that waiting for any of several is simple and losing the device wakes everybody.
+//! Waiting by the host and by queue threads: fences, semaphores and events of a device share one lock and one condition
+//! variable, so that a wait for any of several is simple, and losing the device wakes every waiter.
 
 use crate::abi::error::Error;
 use std::sync::{Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
-/// A device's lock and condition for everything that can be waited for.
+/// A device's lock and condition variable for everything that can be waited for.
 ///
-/// Values live in atomics of the objects; they change only inside [`DeviceSync::update`].
+/// The values are atomics of the objects; they change only inside [`DeviceSync::update`].
 #[derive(Debug, Default)]
 pub(crate) struct DeviceSync {
     gate: Mutex<()>,
@@ -18,17 +18,17 @@ pub(crate) struct DeviceSync {
 /// The end of a wait.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum WaitResult {
-    /// The thing that was waited for is there.
+    /// The condition is met.
     Ready,
-    /// The time is over.
+    /// The timeout has expired.
     TimedOut,
-    /// The device was lost, and what was waited for isn't there.
+    /// The device was lost before the condition was met.
     Lost,
 }
 
 impl DeviceSync {
     fn lock(&self) -> MutexGuard<'_, ()> {
-        // The lock guards no data of its own, so that a panic under it leaves nothing half-done.
+        // The lock guards no data of its own, so that a panic under it leaves nothing inconsistent.
         self.gate.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -41,7 +41,7 @@ impl DeviceSync {
         result
     }
 
-    /// Marks the device as lost and wakes every waiter. The first reason stays: others follow from it.
+    /// Marks the device as lost and wakes every waiter. Only the first reason is kept, because others follow from it.
     pub(crate) fn lose(&self, reason: &str) {
         log::error!("the device is lost: {reason}");
         self.update(|| {
@@ -49,7 +49,7 @@ impl DeviceSync {
         });
     }
 
-    /// Fails if the device is lost. Commands that may return `VK_ERROR_DEVICE_LOST` ask first.
+    /// Fails if the device is lost. Commands that may return `VK_ERROR_DEVICE_LOST` call this first.
     ///
     /// # Errors
     /// [`Error::DeviceLost`].
@@ -90,7 +90,7 @@ impl DeviceSync {
     }
 }
 
-/// The moment `nanoseconds` from now, or `None` where that is beyond what the clock can tell: forever.
+/// The time `nanoseconds` from now; `None`, which means forever, if the clock can't represent it.
 pub(crate) fn deadline(nanoseconds: u64) -> Option<Instant> {
     Instant::now().checked_add(Duration::from_nanos(nanoseconds))
 }

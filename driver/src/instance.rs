@@ -1,9 +1,9 @@
-//! Instances, with their version, extensions and debug messengers, and the physical device that each has one of.
+//! Instances, with their version, extensions and debug messengers, and the physical device of each instance.
 //!
-//! The version is 1.3: every core command's name is there. It is not a claim of conformance
-//! (`conformanceVersion` is 0.0.0.0): features that 1.3 requires and that don't work yet are reported as false and
-//! refused by `vkCreateDevice`, and commands that don't work yet fail with a message. A lower version would hide
-//! dynamic rendering and synchronization2, which do work, behind chains of extensions that don't.
+//! The version is 1.3: every core command's name is found. The version claims no conformance (`conformanceVersion` is
+//! 0.0.0.0): features that 1.3 requires and that don't work yet are reported as false and refused by `vkCreateDevice`,
+//! and commands that don't work yet fail with a message. With a lower version, dynamic rendering and synchronization2,
+//! which do work, would depend on extensions that don't.
 
 use crate::abi::error::Error;
 use crate::abi::handle::{self, Reporter, objects};
@@ -25,7 +25,7 @@ pub(crate) fn device_extension_names() -> &'static [&'static CStr] {
     &NAMES
 }
 
-/// The instance extensions: those of window systems only where there are such.
+/// The instance extensions; those of window systems only if there are window systems.
 fn instance_extensions() -> Vec<Extension> {
     let listed = INSTANCE.iter().copied();
     listed
@@ -33,7 +33,7 @@ fn instance_extensions() -> Vec<Extension> {
         .collect()
 }
 
-/// The requested extensions as the driver's own names.
+/// The requested extensions, as the driver's own names.
 ///
 /// # Errors
 /// [`Error::ExtensionNotPresent`] for the first that isn't in `available`.
@@ -65,7 +65,7 @@ pub(crate) fn extension_properties(extensions: &[Extension]) -> Vec<vk::Extensio
         .collect()
 }
 
-/// An instance. It owns its one physical device.
+/// An instance. It owns its only physical device.
 pub(crate) struct Instance {
     this: Weak<Self>,
     api_version: u32,
@@ -88,7 +88,7 @@ objects! {
     vk::DebugUtilsMessengerEXT => DebugMessenger;
 }
 
-/// The version and the extensions under which commands are looked up.
+/// The version and the extensions that decide which commands are found.
 pub(crate) struct EnabledExtensions<'a> {
     /// The instance's `apiVersion`, at most the driver's.
     pub(crate) api_version: u32,
@@ -99,7 +99,7 @@ pub(crate) struct EnabledExtensions<'a> {
 }
 
 impl Instance {
-    /// An instance for an application that asked for `api_version` (0 means 1.0) and `extensions`.
+    /// An instance for an application that requests `api_version` (0 means 1.0) and `extensions`.
     ///
     /// # Errors
     /// [`Error::ExtensionNotPresent`].
@@ -118,12 +118,12 @@ impl Instance {
         }))
     }
 
-    /// Its one physical device.
+    /// Its only physical device.
     pub(crate) fn physical_device(&self) -> vk::PhysicalDevice {
         self.physical_device
     }
 
-    /// The version and extensions under which commands are looked up through this instance.
+    /// The version and extensions that decide which commands are found through this instance.
     pub(crate) fn enabled(&self) -> EnabledExtensions<'_> {
         EnabledExtensions {
             api_version: self.api_version,
@@ -158,7 +158,7 @@ impl Instance {
             .clone()
     }
 
-    /// Sends a message of the driver's own to the messengers that want it.
+    /// Sends a message of the driver to the messengers that accept it.
     pub(crate) fn report(
         &self,
         severity: vk::DebugUtilsMessageSeverityFlagsEXT,
@@ -195,7 +195,7 @@ pub(crate) struct PhysicalDevice {
 }
 
 impl PhysicalDevice {
-    /// The physical device of an instance, which may be under construction.
+    /// The physical device of an instance, which may still be under construction.
     pub(crate) fn new(instance: Weak<Instance>) -> Self {
         Self { instance }
     }
@@ -236,7 +236,7 @@ impl DebugMessenger {
         }
     }
 
-    /// Calls the application if it wants such messages.
+    /// Calls the application's callback if its filter accepts the message.
     ///
     /// # Safety
     /// `data` and what it points at are valid; the application keeps its callback callable while it is registered.
@@ -248,7 +248,7 @@ impl DebugMessenger {
     ) {
         let wanted = self.severities.contains(severity) && self.types.intersects(types);
         if let Some(callback) = self.callback.filter(|_| wanted) {
-            // SAFETY: the caller's promise. The result asks to abort the call, which is for layers.
+            // SAFETY: the caller's promise. The callback's result, which asks to abort the call, is meant for layers.
             unsafe { callback(severity, types, data, self.user_data) };
         }
     }
@@ -268,7 +268,7 @@ impl DebugMessenger {
         );
     }
 
-    /// As [`DebugMessenger::submit`], of a message of the driver's own.
+    /// As [`DebugMessenger::submit`], with a message of the driver.
     pub(crate) fn report(
         &self,
         severity: vk::DebugUtilsMessageSeverityFlagsEXT,
@@ -343,7 +343,7 @@ pub(crate) unsafe fn create_instance(
 ) -> Result<Arc<Instance>, Error> {
     // SAFETY: the caller's promise.
     unsafe { new_instance(create_info) }.inspect_err(|error| {
-        // Messengers of the chain hear about the creation of the instance itself.
+        // Messengers in the chain receive errors of the creation of the instance itself.
         // SAFETY: the caller's promise.
         let messengers = unsafe { valid::chain(create_info.p_next) }
             .filter_map(valid::cast::<vk::DebugUtilsMessengerCreateInfoEXT<'_>>);

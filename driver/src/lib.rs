@@ -1,9 +1,9 @@
 //! The GauRast driver: a software Vulkan driver that draws with a simulated device.
 //!
-//! There are two doors to it. [`entry`] gives an [`ash::Entry`] over the driver linked into this process; and
-//! `driver/icd` exports [`loader`] as a shared library for the Vulkan loader. Both lead to one table of commands.
+//! There are two ways to use it. [`entry`] gives an [`ash::Entry`] over the driver linked into this process;
+//! `driver/icd` exports [`loader`] as a shared library for the Vulkan loader. Both use the same table of commands.
 //!
-//! The driver keeps Vulkan's objects, a file for each chapter of the specification, and replays recorded commands as
+//! The driver has Vulkan's objects, a file for each chapter of the specification, and replays recorded commands as
 //! [`simdevice`] packets. It never computes a pixel.
 
 mod abi;
@@ -33,10 +33,10 @@ pub use abi::handle::live_handles;
 
 /// The driver as an [`ash::Entry`].
 ///
-/// Nothing need be installed, and layers aren't loaded. The entry and what is created from it may be used on any
-/// thread, as Vulkan allows.
+/// Nothing needs to be installed, and layers aren't loaded. The entry and the objects created from it may be used on
+/// any thread, as Vulkan allows.
 pub fn entry() -> ash::Entry {
-    // SAFETY: the function behaves as Vulkan says and is there as long as the program.
+    // SAFETY: the function behaves as Vulkan specifies and exists as long as the program.
     unsafe {
         ash::Entry::from_static_fn(ash::StaticFn {
             get_instance_proc_addr: dispatch::vkGetInstanceProcAddr,

@@ -1,4 +1,4 @@
-//! The driver's half of the interface between the Vulkan loader and a driver, which `driver/icd` exports.
+//! The driver's part of the interface between the Vulkan loader and a driver, which `driver/icd` exports.
 
 use crate::abi::error::Error;
 use crate::abi::guard::guard;
@@ -10,7 +10,7 @@ use std::ffi::c_char;
 /// The newest version of the loader's interface that the driver knows.
 const NEWEST_INTERFACE: u32 = 7;
 
-/// The oldest that it accepts: from 3 on, surfaces are the driver's own objects.
+/// The oldest version that the driver accepts: from 3 on, surfaces are the driver's own objects.
 const OLDEST_INTERFACE: u32 = 3;
 
 /// Agrees with the loader on a version of their interface.

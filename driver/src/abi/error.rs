@@ -1,4 +1,4 @@
-//! What can go wrong in a command, and the one place where it becomes a `VkResult`.
+//! The errors of commands, and their conversion to a `VkResult`, which happens only here.
 
 use crate::window::WindowLost;
 use ash::vk;
@@ -19,7 +19,7 @@ pub(crate) enum Error {
     /// A null pointer where Vulkan requires a valid one.
     #[error("a required pointer to {what} is null")]
     NullPointer {
-        /// The type pointed at.
+        /// The type of the pointer's target.
         what: &'static str,
     },
     /// A command that this driver doesn't execute.
@@ -28,28 +28,28 @@ pub(crate) enum Error {
         /// Its Vulkan name.
         command: String,
     },
-    /// The device has no memory for it.
+    /// The device has no memory for an object.
     #[error("out of device memory: {0}")]
     OutOfDeviceMemory(String),
-    /// The host has no memory for it.
+    /// The host has no memory for an object.
     #[error("out of host memory: {0}")]
     OutOfHostMemory(String),
-    /// A descriptor pool has nothing left of what is wanted.
+    /// A descriptor pool has too few sets or descriptors left.
     #[error("out of pool memory: {0}")]
     OutOfPoolMemory(String),
-    /// A shader that is malformed, or that asks for what the device lacks.
+    /// A shader that is malformed, or that needs a feature that the device lacks.
     #[error("invalid shader: {0}")]
     InvalidShader(String),
-    /// An object could not be made.
+    /// An object could not be created.
     #[error("{0}")]
     InitializationFailed(String),
     /// The device is lost: a submission panicked.
     #[error("the device is lost: {0}")]
     DeviceLost(String),
-    /// A window that can't be shown to any more.
+    /// A window to which pictures can no longer be presented.
     #[error(transparent)]
     SurfaceLost(WindowLost),
-    /// A window that a swapchain presents to already.
+    /// A window to which another swapchain presents.
     #[error("another swapchain presents to the window")]
     NativeWindowInUse,
     /// Memory that can't be mapped.
@@ -64,12 +64,12 @@ pub(crate) enum Error {
     /// A feature that isn't supported.
     #[error("{0} is not supported")]
     FeatureNotPresent(String),
-    /// A mode of the extension whose feature is not enabled, or does not exist here.
+    /// A mode of the extension whose feature is not enabled, or not supported by this device.
     #[error("{message} ({vuid})")]
     FeatureNotEnabled {
         /// The rule's id.
         vuid: &'static str,
-        /// The use of which feature.
+        /// The mode, as the text of the message.
         message: String,
     },
     /// A format, or a use of it, that isn't supported.
@@ -89,7 +89,7 @@ pub(crate) enum Error {
 }
 
 impl Error {
-    /// A rule that the application breaks.
+    /// The error of a rule that the application breaks.
     pub(crate) fn usage(vuid: impl Into<Cow<'static, str>>, message: impl Into<String>) -> Self {
         Self::InvalidUsage {
             vuid: vuid.into(),
@@ -136,7 +136,7 @@ impl Error {
         }
     }
 
-    /// Tells if the application's usage, and not the driver or the machine, is at fault.
+    /// Reports whether the application's usage is at fault, not the driver or the machine.
     pub(crate) fn is_usage(&self) -> bool {
         matches!(
             self,

@@ -1,14 +1,14 @@
-//! The guard around each command: panics and errors are caught, reported and become results, and threads round as Rust
-//! assumes.
+//! The guard around each command: it catches panics and errors, reports them and converts them to results, and sets the
+//! rounding mode that Rust assumes.
 //!
 //! The functions that Vulkan calls are generated (`dispatch/commands.rs`, by `driver/gen`). Each is this guard around a
-//! conversion of its parameters and a call of one function of the driver, which has `#[doc(alias = "vkCreateBuffer")]`, by
-//! which the generator and people find it, and takes its parameters in the forms that it wants:
-//! - handles become objects through [`handle`](crate::abi::handle), pointers and chains references through
+//! conversion of its parameters and a call of one function of the driver. That function has a `#[doc(alias =
+//! "vkCreateBuffer")]`, by which the generator and readers find it. Parameters and results are converted:
+//! - handles become objects through [`handle`](crate::abi::handle), pointers and chains become references through
 //!   [`valid`](crate::abi::valid);
-//! - `Ok(())` is `VK_SUCCESS`, another success code is `Ok(vk::Result)`, and an error is logged, sent to the instance's debug
-//!   messengers and returned as [`Error::result`];
-//! - output handles of a command that fails are left as they were, except where Vulkan demands null;
+//! - `Ok(())` is `VK_SUCCESS`, another success code is `Ok(vk::Result)`, and an error is logged, sent to the instance's
+//!   debug messengers and returned as [`Error::result`];
+//! - output handles of a command that fails are unchanged, except if Vulkan requires null;
 //! - allocation callbacks are accepted and ignored, as Vulkan allows.
 
 use crate::abi::error::Error;
@@ -31,7 +31,7 @@ impl ReturnCode for vk::Result {
     }
 }
 
-/// Commands without a result: the error is only reported.
+/// For commands without a result, an error is only reported.
 impl ReturnCode for () {
     fn failure(_: &Error) {}
 }
@@ -47,9 +47,9 @@ macro_rules! zero_on_failure {
 }
 zero_on_failure!(u32, u64, vk::PFN_vkVoidFunction);
 
-/// A command's first parameter, by which the listener to its errors is found.
+/// A command's first parameter, which leads to the listener for its errors.
 pub(crate) trait Caller: Copy {
-    /// The listener that hears about errors.
+    /// The listener for errors, if there is one.
     ///
     /// # Safety
     /// As [`handle::get`].
@@ -76,8 +76,8 @@ impl<T> Caller for *mut T {
     }
 }
 
-/// Runs a command: no panic leaves it, no error leaves it unreported, and how the application's thread rounds does not
-/// matter.
+/// Runs a command. No panic leaves it, every error is reported, and the rounding mode of the application's thread does
+/// not matter.
 pub(crate) fn guard<C: Caller, R: ReturnCode>(
     caller: C,
     command: &str,
@@ -94,7 +94,7 @@ pub(crate) fn guard<C: Caller, R: ReturnCode>(
             R::failure(&error)
         }
         Err(panic) => {
-            // The panic may have come from the caller's own destruction, so its listener is not looked for.
+            // The panic may come from the caller's own destruction, so its listener is not looked up.
             let error = match OutOfMemory::of_panic(panic.as_ref()) {
                 Some(memory) => Error::OutOfHostMemory(memory.to_string()),
                 None => Error::Panic(panic_message(panic.as_ref()).to_owned()),
@@ -105,7 +105,7 @@ pub(crate) fn guard<C: Caller, R: ReturnCode>(
     }
 }
 
-/// Logs an error and tells the listener.
+/// Logs an error and reports it to the listener.
 fn report(reporter: Option<&dyn Reporter>, command: &str, error: &Error) {
     log::error!("{command}: {error} [{}]", error.message_id());
     if let Some(reporter) = reporter {
@@ -122,10 +122,10 @@ pub(crate) fn panic_message(panic: &(dyn Any + Send)) -> &str {
         .unwrap_or("panic")
 }
 
-/// The default floating-point environment of a thread, until it is dropped. Applications may flush denormals to zero or
-/// round upwards in their threads, which is no business of the driver. Each command computes as Rust and Vulkan assume,
-/// and so do the threads that it starts, which begin with the environment of the thread that starts them; on return the
-/// application finds its own.
+/// Sets the default floating-point environment of a thread until it is dropped. Applications may flush denormals to
+/// zero or round upwards in their threads. Each command computes with the modes that Rust and Vulkan assume, and so do
+/// the threads that it starts, which inherit the environment of the thread that starts them. On return the
+/// application's own environment is restored.
 pub(crate) struct FloatEnvironment(Option<register::Bits>);
 
 impl FloatEnvironment {
@@ -153,7 +153,7 @@ mod register {
     use std::arch::asm;
 
     pub(super) type Bits = u32;
-    /// All but the flags of what has happened.
+    /// All bits except the flags of exceptions that have occurred.
     pub(super) const MODES: Bits = 0xffc0;
     /// All exceptions are masked.
     pub(super) const DEFAULT: Bits = 0x1f80;

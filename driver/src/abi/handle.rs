@@ -1,8 +1,8 @@
-//! Handles: the one place where a Vulkan handle becomes a reference and back.
+//! Handles: the only place where a Vulkan handle becomes a reference and back.
 //!
-//! A handle is a pointer to a [`HandleAllocation`], which owns an [`Arc`] of the object. The loader's word comes first, because
-//! the loader writes its dispatch table there for dispatchable handles; then a tag, which is checked whenever a
-//! handle is used. Nothing ever hands out `&mut T`: objects lock what changes.
+//! A handle is a pointer to a [`HandleAllocation`], which owns an [`Arc`] of the object. The loader's word comes first,
+//! because the loader writes its dispatch table there for dispatchable handles; then a tag, which is checked whenever a
+//! handle is used. A handle never gives `&mut T`: objects lock what changes.
 
 use crate::abi::error::Error;
 use ash::vk;
@@ -16,21 +16,21 @@ const LOADER_MAGIC: usize = 0x01CD_C0DE;
 /// The upper half of every tag; the lower half is the `VkObjectType`.
 const TAG_MAGIC: u64 = 0x4741_5553 << 32;
 
-/// The tag of a destroyed object, seen if its memory has not been reused.
+/// The tag of a destroyed object, which is found if its memory has not been reused.
 const DESTROYED: u64 = 0;
 
-/// The number of handles that were ever made.
+/// The number of handles created so far.
 static MADE: AtomicU64 = AtomicU64::new(0);
 
 /// The number of handles that exist.
 static LIVE: AtomicUsize = AtomicUsize::new(0);
 
-/// A Vulkan object: what a handle of type [`Object::Handle`] owns.
+/// A Vulkan object: the thing that a handle of type [`Object::Handle`] owns.
 pub(crate) trait Object: Send + Sync + 'static {
     /// Its handle's type.
     type Handle: Handle<Object = Self>;
 
-    /// The listener that hears about errors of commands on this object.
+    /// The listener for errors of commands on this object.
     fn reporter(&self) -> Option<Arc<dyn Reporter>> {
         None
     }
@@ -38,7 +38,7 @@ pub(crate) trait Object: Send + Sync + 'static {
 
 /// A listener to errors of commands: an instance with its debug messengers.
 pub(crate) trait Reporter {
-    /// Hears of an error of the Vulkan command `command`.
+    /// Receives an error of the Vulkan command `command`.
     fn report_error(&self, command: &str, error: &Error);
 }
 
@@ -70,7 +70,7 @@ struct HandleAllocation<T> {
     /// The loader overwrites it with its dispatch table; the driver never reads it.
     loader_word: UnsafeCell<usize>,
     tag: AtomicU64,
-    /// Tells this handle from those that had its address before.
+    /// A number that distinguishes this handle from earlier ones at the same address.
     serial: u64,
     object: Arc<T>,
 }
@@ -86,7 +86,7 @@ fn invalid<H: vk::Handle>(raw: u64) -> Error {
     }
 }
 
-/// Makes a handle that owns `object`.
+/// Creates a handle that owns `object`.
 pub(crate) fn create<T: Object>(object: Arc<T>) -> T::Handle {
     LIVE.fetch_add(1, Ordering::Relaxed);
     let allocation = Box::new(HandleAllocation {
@@ -98,7 +98,7 @@ pub(crate) fn create<T: Object>(object: Arc<T>) -> T::Handle {
     vk::Handle::from_raw(Box::into_raw(allocation) as u64)
 }
 
-/// Finds the allocation of a handle after checking that it is plausible and rightly tagged.
+/// Finds the allocation of a handle, after checking that its address is plausible and its tag is right.
 ///
 /// # Safety
 /// As [`get`].
@@ -164,7 +164,7 @@ pub(crate) unsafe fn get_all<H: Handle>(handles: &[H]) -> Result<Vec<Arc<H::Obje
         .collect()
 }
 
-/// Live handles, whose objects are looked up one by one, without a list of them.
+/// Live handles, whose objects are looked up one by one, without a list of objects.
 #[derive(Clone, Copy)]
 pub(crate) struct Handles<'a, H>(&'a [H]);
 
@@ -182,13 +182,13 @@ impl<'a, H: Handle> Handles<'a, H> {
         self.0.len()
     }
 
-    /// Their objects; [`Error::InvalidHandle`] for a handle that is null or of another type.
+    /// The handles' objects; [`Error::InvalidHandle`] for a handle that is null or of another type.
     pub(crate) fn objects(self) -> impl Iterator<Item = Result<&'a Arc<H::Object>, Error>> {
         // SAFETY: the promise of `new`.
         self.0.iter().map(|&handle| unsafe { get(handle) })
     }
 
-    /// Their objects, of which null handles have none; [`Error::InvalidHandle`] for a handle of another type.
+    /// The handles' objects, `None` for null handles; [`Error::InvalidHandle`] for a handle of another type.
     pub(crate) fn optional_objects(
         self,
     ) -> impl Iterator<Item = Result<Option<&'a Arc<H::Object>>, Error>> {
@@ -197,7 +197,7 @@ impl<'a, H: Handle> Handles<'a, H> {
     }
 }
 
-/// The objects of several handles, of which null ones have none.
+/// The objects of several handles, `None` for null handles.
 ///
 /// # Errors
 /// [`Error::InvalidHandle`] if any is of another type.
@@ -214,10 +214,9 @@ pub(crate) unsafe fn get_all_optional<H: Handle>(
         .collect()
 }
 
-/// Destroys a handle and returns what it owned; null is allowed and does nothing.
+/// Destroys a handle and returns the object that it owned. A null handle is ignored.
 ///
-/// # Errors
-/// [`Error::InvalidHandle`] if the handle is of another type; it is left alone.
+/// # Errors [`Error::InvalidHandle`] if the handle is of another type; it is not destroyed.
 ///
 /// # Safety
 /// As [`get`]; and nothing uses the handle during or after this call.
@@ -260,7 +259,7 @@ pub(crate) unsafe fn serial(object_type: vk::ObjectType, raw: u64) -> Result<u64
     }
 }
 
-/// The number of Vulkan objects this process holds handles of, over all instances. Tests find leaks by it.
+/// The number of Vulkan objects that this process has handles of, over all instances. Tests find leaks with it.
 pub fn live_handles() -> usize {
     LIVE.load(Ordering::Relaxed)
 }

@@ -1,8 +1,8 @@
 //! Pointers in a command's parameters as references, slices and strings; `pNext` chains; and the two-call idiom.
 //!
-//! Every unsafe function here is unsafe for one reason: Vulkan's valid usage must hold of the pointer, that is, it is null
-//! (which is found and refused, or allowed, as each function says) or valid for the type and the length, for as long
-//! as the command lasts.
+//! Every unsafe function here has the same requirement: Vulkan's valid usage must hold for the pointer. That is, it is
+//! null (which each function either refuses or allows) or valid for the type and the length, for as long as the command
+//! lasts.
 
 use crate::abi::error::Error;
 use ash::vk;
@@ -133,18 +133,16 @@ pub(crate) unsafe fn output_slice<'a, T>(
     if pointer.is_null() {
         return Err(null::<T>());
     }
-    // SAFETY: the caller's promise, and not null; nothing is said of what the array holds.
+    // SAFETY: the caller's promise, and not null; the elements need not be initialised.
     Ok(unsafe { std::slice::from_raw_parts_mut(pointer.cast::<MaybeUninit<T>>(), count) })
 }
 
-/// The two-call idiom over plain values: without an array, writes how many there are; with one, writes as many as
-/// fit, and how many those were.
+/// The two-call idiom over plain values: without an array, writes their number; with one, writes as many as fit, and
+/// the number written.
 ///
-/// # Errors
-/// [`Error::NullPointer`] if `count` is null.
+/// # Errors [`Error::NullPointer`] if `count` is null.
 ///
-/// # Safety
-/// See the module; `out` is null or has room for `*count` values.
+/// # Safety See the module; `out` is null or has space for `*count` values.
 pub(crate) unsafe fn enumerate<T: Copy>(
     count: *mut u32,
     out: *mut T,
@@ -158,7 +156,7 @@ pub(crate) unsafe fn enumerate<T: Copy>(
     }
 }
 
-/// Structures that the application initialised, of which the command fills in as many as there is room for: the two-call
+/// An array of structures that the application initialised, of which the command fills in as many as fit: the two-call
 /// idiom.
 pub(crate) struct Structures<'a, T> {
     count: &'a mut u32,
@@ -179,11 +177,10 @@ impl<'a, T> Structures<'a, T> {
         Ok(Self { count, out })
     }
 
-    /// Writes how many there are if there is no array, or else calls `fill(index, structure)` for each that fits, which must
-    /// leave `sType` and `pNext` alone.
+    /// Writes the number of structures if there is no array; otherwise calls `fill(index, structure)` for each that
+    /// fits. `fill` must not change `sType` and `pNext`.
     ///
-    /// # Errors
-    /// None; a result, for the application to receive.
+    /// # Errors None; the result is for the application.
     pub(crate) fn fill(
         self,
         available: usize,
@@ -198,7 +195,7 @@ impl<'a, T> Structures<'a, T> {
     }
 }
 
-/// The idiom itself.
+/// The two-call idiom with a function that writes each element.
 ///
 /// # Safety
 /// As [`enumerate`]; `fill` may write through the pointer that it is given.

@@ -64,7 +64,7 @@ pub(crate) fn cmd_bind_vertex_buffers2(
     bind_vertex_buffers(recorder, first_binding, buffers, offsets, sizes, strides)
 }
 
-/// No bytes: what a null buffer has.
+/// The empty range of a null buffer.
 fn nothing() -> Result<BufferRange, Error> {
     let memory =
         Allocation::new_zeroed(1).map_err(|error| Error::OutOfDeviceMemory(error.to_string()))?;
@@ -143,7 +143,7 @@ pub(crate) fn cmd_bind_index_buffer(
     Ok(())
 }
 
-/// Records vertex buffers; `sizes` and `strides` are empty or have one for each. From a null buffer vertices read zero.
+/// Records vertex buffers; `sizes` and `strides` are empty or have one for each. Vertices read zero from a null buffer.
 fn bind_vertex_buffers(
     recorder: &mut Recorder,
     first: u32,
@@ -310,7 +310,7 @@ fn dynamic_offset_count_error() -> Error {
     )
 }
 
-/// The layout, if its sets are pushed.
+/// The layout. An error if its sets are not pushed.
 fn pushed(layout: Arc<DescriptorSetLayout>) -> Result<Arc<DescriptorSetLayout>, Error> {
     if layout.is_push() {
         return Ok(layout);

@@ -1,5 +1,5 @@
-//! Command pools and command buffers, and recording: a command buffer's life, and the little that must be known while it is
-//! recorded.
+//! Command pools and command buffers, and recording: the states of a command buffer, and the state that recording
+//! needs.
 
 use super::Command;
 use super::render_scope::RenderScope;
@@ -18,7 +18,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 /// A command pool. It owns the handles of its command buffers.
 pub(crate) struct CommandPool {
     device: Arc<Device>,
-    /// True if single command buffers may be reset.
+    /// True if command buffers may be reset individually.
     allows_reset: bool,
     buffers: Mutex<HashSet<vk::CommandBuffer>>,
 }
@@ -54,7 +54,7 @@ impl CommandPool {
         self.buffers.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Makes a command buffer.
+    /// Allocates a command buffer.
     pub(crate) fn allocate(&self, level: vk::CommandBufferLevel) -> vk::CommandBuffer {
         let buffer = handle::create(Arc::new(CommandBuffer {
             device: Arc::clone(&self.device),
@@ -66,13 +66,11 @@ impl CommandPool {
         buffer
     }
 
-    /// Frees command buffers of this pool; others are left alone.
+    /// Frees command buffers of this pool; others are not freed.
     ///
-    /// # Errors
-    /// [`Error::InvalidUsage`] if one is not of this pool.
+    /// # Errors [`Error::InvalidUsage`] if one is not of this pool.
     ///
-    /// # Safety
-    /// Nothing uses the handles any more.
+    /// # Safety Nothing uses the handles any more.
     pub(crate) unsafe fn free(&self, buffers: &[vk::CommandBuffer]) -> Result<(), Error> {
         let null = vk::CommandBuffer::null();
         for &buffer in buffers.iter().filter(|&&buffer| buffer != null) {
@@ -82,7 +80,7 @@ impl CommandPool {
                     "a command buffer is not of the pool",
                 ));
             }
-            // SAFETY: the pool made the handle and has not destroyed it, and the caller uses it no more.
+            // SAFETY: the pool made the handle and has not destroyed it, and the caller no longer uses it.
             unsafe { handle::destroy(buffer) }?;
         }
         Ok(())
@@ -111,22 +109,23 @@ impl CommandPool {
 }
 
 impl CommandBuffer {
-    /// Its recorder. Vulkan has the application use a command buffer from one thread at a time, so that nobody waits.
+    /// Its recorder. Vulkan requires that only one thread at a time uses a command buffer, so the lock is never
+    /// contended.
     pub(crate) fn recorder(&self) -> MutexGuard<'_, Recorder> {
         self.recorder.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The device that it is of.
+    /// The device to which it belongs.
     pub(super) fn device(&self) -> &Device {
         &self.device
     }
 
-    /// Tells if it is a secondary command buffer.
+    /// Reports whether it is a secondary command buffer.
     pub(crate) fn is_secondary(&self) -> bool {
         self.level == vk::CommandBufferLevel::SECONDARY
     }
 
-    /// Tells if it may be reset by itself, be it by beginning it again.
+    /// Reports whether it may be reset individually, explicitly or by beginning it again.
     pub(crate) fn allows_reset(&self) -> bool {
         self.allows_reset
     }
@@ -134,7 +133,8 @@ impl CommandBuffer {
     /// Ends recording.
     ///
     /// # Errors
-    /// That of [`Recorder::end`], or [`Error::Panic`] if a command panicked while it was recorded and so is missing.
+    /// Returns the error of [`Recorder::end`], or [`Error::Panic`] if a command panicked while it was recorded and so
+    /// is missing.
     pub(crate) fn end(&self) -> Result<(), Error> {
         let panicked = self.recorder.is_poisoned();
         self.recorder.clear_poison();
@@ -147,10 +147,9 @@ impl CommandBuffer {
         recorder.end()
     }
 
-    /// Records: an error of `record` is reported now, and `vkEndCommandBuffer` fails with the first.
+    /// Records a command. An error of `record` is reported now, and `vkEndCommandBuffer` fails with the first.
     ///
-    /// # Errors
-    /// That of `record`, or [`Error::InvalidUsage`] if the command buffer is not recording.
+    /// # Errors Returns the error of `record`, or [`Error::InvalidUsage`] if the command buffer is not recording.
     pub(crate) fn record(
         &self,
         command: &'static str,
@@ -165,7 +164,7 @@ impl CommandBuffer {
     }
 }
 
-/// The state of a command buffer's life. It is pending while a [`PendingUse`] of it lives.
+/// The state of a command buffer. It is pending while a [`PendingUse`] of it exists.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Status {
     Initial,
@@ -174,14 +173,14 @@ enum Status {
     Invalid,
 }
 
-/// The uses that a recording is begun for.
+/// The uses for which a recording is begun.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct BeginFlags {
-    /// It is submitted once.
+    /// True if it is submitted only once.
     pub(crate) one_time: bool,
-    /// It may be submitted while it is pending.
+    /// True if it may be submitted while it is pending.
     pub(crate) simultaneous: bool,
-    /// It is a secondary that runs inside a pass with these colour formats.
+    /// The colour formats of the pass in which it runs, if it is a secondary that continues one.
     pub(crate) inherited_pass: Option<Vec<Option<Format>>>,
 }
 
@@ -193,7 +192,7 @@ pub(crate) struct Recorder {
     usage: BeginFlags,
     commands: Vec<Command>,
     finished: Option<Arc<Vec<Command>>>,
-    /// The render pass, or dynamic rendering, that commands are recorded within.
+    /// The render pass, or dynamic rendering, within which commands are recorded.
     pub(super) pass: Option<RenderScope>,
     /// True within a set of Gaussian draws.
     pub(super) has_gaussian_set: bool,
@@ -201,7 +200,8 @@ pub(crate) struct Recorder {
     pending: Arc<AtomicUsize>,
 }
 
-/// A submission's or another recording's use of a command buffer, which is pending as long as one lives.
+/// The use of a command buffer by a submission or by another recording. The command buffer is pending as long as one
+/// exists.
 #[derive(Debug)]
 pub(crate) struct PendingUse(Arc<AtomicUsize>);
 
@@ -234,7 +234,7 @@ impl Recorder {
         }
     }
 
-    /// Fails within a set of draws.
+    /// Fails within a set of Gaussian draws.
     ///
     /// # Errors
     /// [`Error::InvalidUsage`].
@@ -249,12 +249,12 @@ impl Recorder {
         }
     }
 
-    /// Tells if it may be begun again without an explicit reset.
+    /// Reports whether it may be begun again without an explicit reset.
     pub(crate) fn is_initial(&self) -> bool {
         self.status == Status::Initial
     }
 
-    /// Back to the initial state.
+    /// Returns to the initial state.
     ///
     /// # Errors
     /// [`Error::InvalidUsage`] if it is pending.
@@ -269,7 +269,7 @@ impl Recorder {
         Ok(())
     }
 
-    /// Starts recording anew.
+    /// Starts a new recording.
     ///
     /// # Errors
     /// [`Error::InvalidUsage`] if it is pending or recording.
@@ -304,7 +304,7 @@ impl Recorder {
         ))
     }
 
-    /// Ends recording.
+    /// Ends the recording.
     ///
     /// # Errors
     /// The first error met while recording, or [`Error::InvalidUsage`] if it was not recording or a pass has not ended. The
@@ -335,7 +335,7 @@ impl Recorder {
         }
     }
 
-    /// The recorded commands, to be executed.
+    /// Returns the recorded commands, for execution.
     ///
     /// # Errors
     /// [`Error::InvalidUsage`] if it is not executable, or pending and not for simultaneous use.
@@ -362,7 +362,7 @@ impl Recorder {
         Ok((Arc::clone(commands), PendingUse::new(&self.pending)))
     }
 
-    /// The recorded commands, for a primary command buffer to execute.
+    /// Returns the recorded commands, for a primary command buffer to execute.
     ///
     /// # Errors
     /// [`Error::InvalidUsage`] if it is not executable.
@@ -424,7 +424,7 @@ impl Recorder {
         })
     }
 
-    /// The format of the current pass's colour attachment number `index`; `None` where it is unused.
+    /// The format of the current pass's colour attachment number `index`; `None` if it is unused.
     ///
     /// # Errors
     /// [`Error::InvalidUsage`] outside a pass.

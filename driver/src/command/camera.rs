@@ -8,11 +8,10 @@ use gaurast::vk::{GaussianCameraDataGAURAST, GaussianCameraGAURAST, GaussianCame
 use simdevice::packet::BufferRange;
 use simdevice::state::gaussian::{Camera, CameraModel};
 
-/// A camera for the device.
+/// Converts a camera for the device.
 ///
-/// # Errors
-/// [`Error::FeatureNotPresent`] for a model that the device does not have, [`Error::InvalidUsage`] for values that are no
-/// camera's.
+/// # Errors [`Error::FeatureNotPresent`] for a model that the device does not have, [`Error::InvalidUsage`] for values
+/// that no camera has.
 fn camera(camera: &GaussianCameraGAURAST) -> Result<Camera, Error> {
     let model = match camera.model {
         GaussianCameraModelGAURAST::PINHOLE => CameraModel::Pinhole,
@@ -62,7 +61,7 @@ pub(crate) fn cmd_set_gaussian_cameras(
 /// Bytes of a `VkGaussianCameraDataGAURAST`.
 const DATA_BYTES: usize = size_of::<GaussianCameraDataGAURAST>();
 
-/// Reads the `VkGaussianCameraDataGAURAST` of a number from a uniform buffer.
+/// Reads the `VkGaussianCameraDataGAURAST` of camera `number` from a uniform buffer.
 ///
 /// # Errors
 /// As [`camera`]; [`Error::InvalidUsage`] if the buffer is too short.
@@ -84,7 +83,7 @@ pub(super) fn read(range: &BufferRange, number: usize) -> Result<Camera, Error> 
     let double =
         |word: usize| f64::from_bits(u64::from(words[word]) | u64::from(words[word + 1]) << 32);
     let pair = |word: usize| [float(word), float(word + 1)];
-    // Rows of the rotation take four words each, of which the last means nothing.
+    // Rows of the rotation have four words each, of which the last is padding.
     let rotation = std::array::from_fn(|element| float(8 + element / 3 * 4 + element % 3));
     camera(
         &GaussianCameraGAURAST::default()
@@ -190,7 +189,7 @@ mod tests {
         bytes.extend(data.model.as_raw().to_le_bytes());
         bytes.extend([0xFF; 4]);
         let rows = data.rotation.as_flattened().iter().enumerate();
-        // What means nothing is not looked at.
+        // Padding is ignored, so it has another value here.
         bytes.extend(rows.flat_map(|(index, value)| match index % 4 {
             3 => f32::NAN.to_le_bytes(),
             _ => value.to_le_bytes(),

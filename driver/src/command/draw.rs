@@ -8,13 +8,13 @@ use crate::resource::buffer::{Buffer, BufferRules};
 use ash::vk;
 use std::sync::Arc;
 
-/// The rules on the parameters of `vkCmdDrawIndirect` and the commands like it.
+/// The rules on the parameters of `vkCmdDrawIndirect` and similar commands.
 const DRAW_INDIRECT: BufferRules = BufferRules {
     memory: "VUID-vkCmdDrawIndirect-buffer-02708",
     range: "VUID-vkCmdDrawIndirect-drawCount-00488",
 };
 
-/// The rules on the count of `vkCmdDrawIndirectCount` and the commands like it.
+/// The rules on the count of `vkCmdDrawIndirectCount` and similar commands.
 const DRAW_COUNT: BufferRules = BufferRules {
     memory: "VUID-vkCmdDrawIndirectCount-countBuffer-02714",
     range: "VUID-vkCmdDrawIndirectCount-countBufferOffset-04129",
@@ -86,15 +86,14 @@ unsafe fn strided<T: Copy>(first: *const T, count: u32, stride: u32) -> Result<V
     Ok(simdevice::host::collect((0..count).map(element)))
 }
 
-/// Records draws of which each knows its number.
+/// Records draws that each know their draw index.
 fn draw_multi(recorder: &mut Recorder, draws: Vec<DrawParameters>) -> Result<(), Error> {
     recorder.require_pass()?;
     recorder.push(Command::DrawMulti(draws));
     Ok(())
 }
 
-/// # Safety
-/// There are as many infos as are said, a stride apart.
+/// # Safety The array has as many infos as the count says, `stride` bytes apart.
 #[doc(alias = "vkCmdDrawMultiEXT")]
 pub(crate) unsafe fn cmd_draw_multi(
     recorder: &mut Recorder,
@@ -136,7 +135,7 @@ pub(crate) unsafe fn cmd_draw_multi_indexed(
         )
     };
     let draws = infos.into_iter().map(|info| DrawParameters {
-        // One offset for all goes before those of each.
+        // One offset for all takes precedence over those of each draw.
         vertex_offset: Some(offset.copied().unwrap_or(info.vertex_offset)),
         first: info.first_index,
         count: info.index_count,
@@ -263,7 +262,7 @@ fn dispatch(recorder: &mut Recorder, base: [u32; 3], count: [u32; 3]) -> Result<
     Ok(())
 }
 
-/// Draws without indices whose parameters lie in a buffer, as many as are said here.
+/// Draws without indices, `draw_count` of them, whose parameters are in a buffer.
 fn draws(
     buffer: &Buffer,
     offset: vk::DeviceSize,
@@ -279,7 +278,7 @@ fn draws(
     })
 }
 
-/// Records draws whose parameters lie in a buffer.
+/// Records draws whose parameters are in a buffer.
 fn draw_indirect(recorder: &mut Recorder, draws: DrawIndirect) -> Result<(), Error> {
     recorder.require_pass()?;
     recorder.push(Command::DrawIndirect(draws));

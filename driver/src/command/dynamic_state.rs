@@ -1,5 +1,5 @@
-//! Commands that set dynamic state, but for those whose parameter is the value of a row in
-//! `driver/src/pipeline/dynamic_state.rs`: these are generated.
+//! Commands that set dynamic state. Those whose parameter is the value of a row in
+//! `driver/src/pipeline/dynamic_state.rs` are generated instead.
 
 use super::Command;
 use super::buffer::Recorder;
@@ -14,7 +14,7 @@ use simdevice::state::DepthBias;
 /// Records a state.
 ///
 /// # Errors
-/// None; a result, as all commands have.
+/// None; it returns a result as all commands do.
 pub(crate) fn set(recorder: &mut Recorder, state: DynamicState) -> Result<(), Error> {
     recorder.push(Command::SetDynamicState(state));
     Ok(())
@@ -23,7 +23,7 @@ pub(crate) fn set(recorder: &mut Recorder, state: DynamicState) -> Result<(), Er
 /// Records a state for each face of a mask.
 ///
 /// # Errors
-/// None; a result, as all commands have.
+/// None; it returns a result as all commands do.
 pub(crate) fn set_faces(
     recorder: &mut Recorder,
     mask: vk::StencilFaceFlags,
@@ -91,7 +91,7 @@ pub(crate) fn cmd_set_primitive_topology(
     recorder: &mut Recorder,
     primitive_topology: vk::PrimitiveTopology,
 ) -> Result<(), Error> {
-    // The Gaussian list is a class of its own, so there is nothing to set.
+    // The Gaussian list is the only topology of its class, so there is nothing to set.
     if primitive_topology == PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST {
         return Ok(());
     }
@@ -129,7 +129,7 @@ pub(crate) fn cmd_set_logic_op(
     set(recorder, DynamicState::LogicOp { op })
 }
 
-/// No pixel has more samples than a word of the mask has bits.
+/// Sets the sample mask. Only its first word matters, because no pixel has more samples than a word has bits.
 #[doc(alias = "vkCmdSetSampleMaskEXT")]
 pub(crate) fn cmd_set_sample_mask(
     recorder: &mut Recorder,
@@ -139,7 +139,7 @@ pub(crate) fn cmd_set_sample_mask(
     set(recorder, DynamicState::SampleMask { mask })
 }
 
-/// Lines have no stipple, whose pattern is of no account so.
+/// Does nothing: the pattern has no effect, because lines are never stippled.
 #[doc(alias = "vkCmdSetLineStippleEXT")]
 pub(crate) fn cmd_set_line_stipple(_recorder: &mut Recorder) -> Result<(), Error> {
     Ok(())
@@ -219,7 +219,7 @@ pub(crate) fn cmd_set_color_write_enable(
     })
 }
 
-/// Records a state of each of some colour attachments.
+/// Records a state for each of several colour attachments.
 fn set_attachments<T>(
     recorder: &mut Recorder,
     first: u32,
@@ -266,7 +266,7 @@ pub(crate) fn cmd_set_scissor_with_count(
     set_scissors(recorder, 0, scissors, true)
 }
 
-/// Fails for viewports and scissors beyond those that the device has.
+/// Fails for viewports and scissors beyond those that the device supports.
 fn require_viewports(first: u32, count: u32) -> Result<(), Error> {
     let available = limits::properties().max_viewports;
     if u64::from(first) + u64::from(count) <= u64::from(available) {

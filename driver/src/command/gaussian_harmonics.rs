@@ -1,4 +1,4 @@
-//! The buffer of Gaussian draws' spherical harmonics.
+//! The command that binds the buffer of Gaussian draws' spherical harmonics.
 
 use super::buffer::{CommandBuffer, Recorder};
 use super::{Command, HarmonicsBuffer};
@@ -29,7 +29,7 @@ pub(crate) fn cmd_bind_gaussian_spherical_harmonics(
     })
 }
 
-/// The bytes that an address and a size name.
+/// The bytes at an address and of a size.
 fn range(
     addresses: &Addresses,
     buffer: &GaussianSphericalHarmonicsBufferGAURAST<'_>,

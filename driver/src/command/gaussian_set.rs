@@ -1,4 +1,4 @@
-//! Sorted sets that several draws share.
+//! Commands that begin and end a sorted set, which several draws share.
 
 use super::Command;
 use super::buffer::{CommandBuffer, Recorder};

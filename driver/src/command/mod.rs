@@ -1,9 +1,9 @@
-//! Command buffers' contents: plain data that recording leaves and that a queue replays as packets.
+//! The contents of command buffers: plain data that is recorded, and that a queue replays as packets.
 //!
-//! Everything that the application passed by pointer has been copied, and every object that a command names is held by
-//! [`Arc`]. [`buffer`] has command buffers and their [`Recorder`](buffer::Recorder), the other modules the commands, chapter
-//! by chapter; [`replay`] walks a recording through one exhaustive match, with the bound state that draws need, and
-//! [`submit`] has queues do that.
+//! Everything that the application passed by pointer is copied, and every object that a command names is held by an
+//! [`Arc`]. [`buffer`] has command buffers and their [`Recorder`](buffer::Recorder), the other modules the commands,
+//! chapter by chapter. [`replay`] walks a recording through one exhaustive match, with the bound state that draws need;
+//! [`submit`] runs the replay on queues.
 
 pub(crate) mod bind;
 pub(crate) mod buffer;
@@ -53,8 +53,8 @@ pub(crate) struct HarmonicsBuffer {
 /// A recorded command.
 #[derive(Clone, Debug)]
 pub(crate) enum Command {
-    /// A command whose meaning depends on no bound state, already a packet: copies, clears, barriers, the
-    /// beginning and end of passes, queries.
+    /// A command that depends on no bound state, already a packet: copies, clears, barriers, begin and end of passes,
+    /// queries.
     Packet(Packet),
     /// `vkCmdBindPipeline` at the graphics bind point.
     BindPipeline(Arc<GraphicsPipeline>),
@@ -73,7 +73,7 @@ pub(crate) enum Command {
         first: u32,
         /// One for each viewport.
         viewports: Vec<Viewport>,
-        /// True if there are no more than these.
+        /// True if they are all viewports.
         with_count: bool,
     },
     /// `vkCmdSetScissor` and `vkCmdSetScissorWithCount`.
@@ -82,7 +82,7 @@ pub(crate) enum Command {
         first: u32,
         /// One for each viewport.
         scissors: Vec<Rect>,
-        /// True if there are no more than these.
+        /// True if they are all scissors.
         with_count: bool,
     },
     /// Any other `vkCmdSet...` of fixed-function state.
@@ -110,7 +110,7 @@ pub(crate) enum Command {
     BindSets(Box<BindSets>),
     /// `vkCmdPushDescriptorSetKHR` and its form with a template.
     PushDescriptors(Box<PushDescriptors>),
-    /// `vkCmdPushConstants`. Whatever stages they are for, they have one memory.
+    /// `vkCmdPushConstants`. All stages share one memory.
     PushConstants {
         /// The first byte.
         offset: u32,
@@ -124,7 +124,7 @@ pub(crate) enum Command {
         /// The number of workgroups in x, y and z.
         count: [u32; 3],
     },
-    /// `vkCmdDispatchIndirect`: the workgroups are counted when it executes.
+    /// `vkCmdDispatchIndirect`: the number of workgroups is read when it executes.
     DispatchIndirect(BufferRange),
     /// `vkCmdSetEvent` (true) and `vkCmdResetEvent` (false).
     SetEvent(Arc<Event>, bool),
@@ -132,14 +132,14 @@ pub(crate) enum Command {
     WaitEvents(Vec<Arc<Event>>),
     /// `vkCmdCopyQueryPoolResults`: the results are read when it executes.
     CopyQueryResults(CopyQueryResults),
-    /// `vkCmdExecuteCommands`: what the secondary command buffers held when this was recorded.
+    /// `vkCmdExecuteCommands`: the contents of the secondary command buffers when this was recorded.
     Execute(Vec<Arc<Vec<Command>>>),
 }
 
 /// Descriptor sets to be bound.
 #[derive(Clone, Debug)]
 pub(crate) struct BindSets {
-    /// Where.
+    /// The bind point.
     pub(crate) bind_point: BindPoint,
     /// The first set's number.
     pub(crate) first: u32,
@@ -147,10 +147,10 @@ pub(crate) struct BindSets {
     pub(crate) sets: Vec<BoundSet>,
 }
 
-/// Descriptors that are pushed.
+/// Descriptors to be pushed.
 #[derive(Clone, Debug)]
 pub(crate) struct PushDescriptors {
-    /// Where.
+    /// The bind point.
     pub(crate) bind_point: BindPoint,
     /// The set's number.
     pub(crate) set: u32,
@@ -165,7 +165,7 @@ pub(crate) struct PushDescriptors {
 pub(crate) struct VertexBuffer {
     /// The bytes that vertices are read from.
     pub(crate) range: BufferRange,
-    /// The stride, where `vkCmdBindVertexBuffers2` gave one.
+    /// The stride, if `vkCmdBindVertexBuffers2` gave one.
     pub(crate) stride: Option<u32>,
 }
 
@@ -193,18 +193,18 @@ pub(crate) struct DrawParameters {
     pub(crate) instance_count: u32,
 }
 
-/// Draws whose parameters lie in a buffer.
+/// Draws whose parameters are in a buffer.
 #[derive(Clone, Debug)]
 pub(crate) struct DrawIndirect {
     /// The bytes from the first draw's parameters to the end of the buffer.
     pub(crate) parameters: BufferRange,
-    /// The number of draws, at most.
+    /// The greatest number of draws.
     pub(crate) draw_count: u32,
-    /// The four bytes that the number of draws is read from, if it lies in a buffer.
+    /// The four bytes from which the number of draws is read, if it is in a buffer.
     pub(crate) count: Option<BufferRange>,
     /// Bytes from one draw's parameters to the next.
     pub(crate) stride: u32,
-    /// True if they are those of indexed draws.
+    /// True for parameters of indexed draws.
     pub(crate) indexed: bool,
 }
 
@@ -221,16 +221,16 @@ pub(crate) struct CopyQueryResults {
     pub(crate) target: BufferRange,
     /// Bytes from one query's results to the next.
     pub(crate) stride: u64,
-    /// The flags: what is written for each query, and whether the copy waits for it.
+    /// The flags: the values written for each query, and whether the copy waits for them.
     pub(crate) flags: vk::QueryResultFlags,
 }
 
 /// A bind point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum BindPoint {
-    /// Draws.
+    /// Used by draws.
     Graphics,
-    /// Dispatches.
+    /// Used by dispatches.
     Compute,
 }
 
@@ -248,12 +248,12 @@ impl BindPoint {
     }
 }
 
-/// A descriptor set as it is bound.
+/// A bound descriptor set.
 #[derive(Clone, Debug)]
 pub(crate) struct BoundSet {
     /// The set; read when a command uses it.
     pub(crate) set: Arc<DescriptorSet>,
-    /// As many as the set's layout wants.
+    /// The dynamic offsets, as many as the set's layout has.
     pub(crate) dynamic_offsets: Vec<u32>,
 }
 

@@ -111,7 +111,8 @@ const TARGET: BufferRules = BufferRules {
     range: "VUID-vkCmdCopyQueryPoolResults-dstOffset-00819",
 };
 
-/// The packets of `vkCmdCopyQueryPoolResults`, as the queries are now. What lies outside the buffer is not written.
+/// The packets of `vkCmdCopyQueryPoolResults`, with the queries' present results. Bytes outside the buffer are not
+/// written.
 pub(crate) fn copy_packets(copy: &CopyQueryResults) -> Vec<Packet> {
     let mut packets = Vec::new();
     for index in 0..u64::from(copy.count) {

@@ -39,7 +39,7 @@ pub(crate) unsafe fn cmd_begin_rendering(
     begin_rendering(recorder, rendering.packet()?)
 }
 
-/// The render pass that a begin info begins.
+/// The render pass instance that a begin info describes.
 ///
 /// # Safety
 /// The info, its chain and its handles are valid.
@@ -101,7 +101,7 @@ unsafe fn dynamic_rendering(info: &vk::RenderingInfo<'_>) -> Result<DynamicRende
     }
 }
 
-/// An attachment of dynamic rendering, if it is used.
+/// An attachment of dynamic rendering; None if it is unused.
 ///
 /// # Safety
 /// The info's handles are live.
@@ -109,7 +109,7 @@ unsafe fn attachment(
     info: &vk::RenderingAttachmentInfo<'_>,
 ) -> Result<Option<DynamicAttachment>, Error> {
     let mode = convert::resolve_mode(info.resolve_mode)?;
-    // SAFETY: the caller's promise; without a mode there may be anything in place of a view.
+    // SAFETY: the caller's promise. Without a resolve mode the view may be invalid, and is not followed.
     let (view, resolve_view) = unsafe {
         let resolve_view = match mode {
             Some(_) => handle::get_optional(info.resolve_image_view)?,

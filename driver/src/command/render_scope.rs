@@ -15,11 +15,11 @@ use simdevice::state::{Rect, ResolveMode};
 use simdevice::{Format, Packet};
 use std::sync::Arc;
 
-/// Checks that a view can be an attachment of `layers` layers for an aspect.
+/// Checks that a view can be an attachment of `layers` layers with an aspect.
 fn check_attachment(view: &ImageView, aspect: Aspect, layers: u32) -> Result<(), Error> {
     let view = &view.view;
     let vuid = if layers > view.layer_count {
-        // Of dynamic rendering, Vulkan has no rule of its own with an id.
+        // For dynamic rendering, Vulkan has no rule of its own with an id.
         "VUID-VkFramebufferCreateInfo-flags-04535"
     } else if view.format.aspects().contains(&aspect) {
         return Ok(());
@@ -39,10 +39,10 @@ fn check_attachment(view: &ImageView, aspect: Aspect, layers: u32) -> Result<(),
     ))
 }
 
-/// The operation of an attachment at the beginning of a pass.
+/// The load operation of an attachment at the beginning of a pass.
 fn load(op: vk::AttachmentLoadOp, clear: impl FnOnce() -> ClearValue) -> Result<LoadOp, Error> {
     match op {
-        // An attachment that nobody may rely on being loaded keeps what is outside of draws.
+        // An attachment with undefined contents may keep them.
         vk::AttachmentLoadOp::LOAD | vk::AttachmentLoadOp::NONE_KHR => Ok(LoadOp::Load),
         vk::AttachmentLoadOp::CLEAR => Ok(LoadOp::Clear(clear())),
         vk::AttachmentLoadOp::DONT_CARE => Ok(LoadOp::DontCare),
@@ -53,7 +53,7 @@ fn load(op: vk::AttachmentLoadOp, clear: impl FnOnce() -> ClearValue) -> Result<
     }
 }
 
-/// The operation of an attachment at the end of a pass.
+/// The store operation of an attachment at the end of a pass.
 fn store(op: vk::AttachmentStoreOp) -> Result<StoreOp, Error> {
     match op {
         vk::AttachmentStoreOp::STORE => Ok(StoreOp::Store),
@@ -82,8 +82,8 @@ fn check_resolve(attachment: &ImageView, view: &ImageView) -> Result<(), Error> 
     ))
 }
 
-/// The packet that begins rendering, once its attachments are known to have as many samples as one another: the device
-/// would be lost over them, too late to say which command was wrong.
+/// The packet that begins rendering, after a check that all attachments have the same number of samples. The device
+/// would be lost otherwise, without naming the command.
 fn begin(rendering: Rendering) -> Result<Packet, Error> {
     let single = [&rendering.depth, &rendering.stencil];
     let attachments = rendering.color.iter().chain(single).flatten();
@@ -98,14 +98,14 @@ fn begin(rendering: Rendering) -> Result<Packet, Error> {
     Ok(Packet::BeginRendering(Box::new(rendering)))
 }
 
-/// A render pass that has begun, with what it renders to.
+/// A render pass that has begun, with its attachments.
 #[derive(Clone)]
 pub(crate) struct RenderPassInstance {
     /// The render pass.
     pub(crate) render_pass: Arc<RenderPass>,
     /// A view for each attachment.
     pub(crate) views: Vec<Arc<ImageView>>,
-    /// The values of attachments that are cleared, by attachment; may be short.
+    /// The clear values, by attachment; there may be fewer than attachments.
     pub(crate) clear_values: Vec<vk::ClearValue>,
     /// The pixels rendered.
     pub(crate) area: Rect,
@@ -162,8 +162,8 @@ impl RenderPassInstance {
         })
     }
 
-    /// The packets that clear what a subpass reads before anything was rendered to it, and what it is the first to use in
-    /// some of its views.
+    /// The packets that clear attachments before a subpass: those that it reads before any rendering, and those that it
+    /// is the first to use in only some of its views.
     ///
     /// # Errors
     /// [`Error::InvalidUsage`] if a view is missing.
@@ -227,13 +227,13 @@ impl RenderPassInstance {
         })
     }
 
-    /// The value that an attachment is cleared to. One that is missing is the application's error; zero is as good as any.
+    /// The clear value of an attachment. A missing one is the application's error; zero is used.
     fn clear_value(&self, view: &ImageView, number: usize) -> ClearValue {
         let value = self.clear_values.get(number).copied().unwrap_or_default();
         clear_value(view.view.format, value)
     }
 
-    /// An attachment and, if it is resolved, the attachment that it is resolved to and how.
+    /// An attachment and, if it is resolved, its resolve target and mode.
     fn attachment(
         &self,
         subpass: usize,
@@ -300,13 +300,13 @@ pub(crate) struct DynamicAttachment {
 /// Dynamic rendering.
 #[derive(Clone, Default)]
 pub(crate) struct DynamicRendering {
-    /// The suspension or resumption of it.
+    /// The flags of suspension and resumption.
     pub(crate) flags: vk::RenderingFlags,
     /// The pixels rendered.
     pub(crate) area: vk::Rect2D,
     /// The layers rendered.
     pub(crate) layers: u32,
-    /// The views that draws are for, a bit each; 0 without views.
+    /// The views that draws render to, a bit each; 0 without views.
     pub(crate) view_mask: u32,
     /// Colour attachments by location.
     pub(crate) color: Vec<Option<DynamicAttachment>>,
@@ -342,7 +342,7 @@ impl DynamicRendering {
         })
     }
 
-    /// Between suspension and resumption attachments are in memory.
+    /// An attachment. Between suspension and resumption attachments are in memory.
     fn attachment(
         &self,
         attachment: &DynamicAttachment,
@@ -350,7 +350,7 @@ impl DynamicRendering {
     ) -> Result<Attachment, Error> {
         let layers = layers(self.view_mask, self.layers);
         check_attachment(&attachment.view, aspect, layers)?;
-        // What is suspended is resolved where it ends.
+        // Rendering that is suspended is resolved where it ends.
         let suspends = self.flags.contains(vk::RenderingFlags::SUSPENDING);
         let resolve = attachment.resolve.as_ref().filter(|_| !suspends);
         let resolve = resolve.map(|(view, mode)| {
@@ -378,9 +378,9 @@ impl DynamicRendering {
     }
 }
 
-/// The render pass, or dynamic rendering, that commands are recorded within.
+/// The render pass, or dynamic rendering, within which commands are recorded.
 pub(crate) enum RenderScope {
-    /// A render pass, at one of its subpasses.
+    /// A render pass, in one of its subpasses.
     RenderPass {
         instance: Box<RenderPassInstance>,
         subpass: usize,
@@ -388,12 +388,12 @@ pub(crate) enum RenderScope {
     },
     /// Dynamic rendering.
     Dynamic { formats: Vec<Option<Format>> },
-    /// That of the primary command buffer.
+    /// The pass of the primary command buffer.
     Inherited { formats: Vec<Option<Format>> },
 }
 
 impl RenderScope {
-    /// The formats of colour attachments; `None` where one is unused.
+    /// The formats of colour attachments; `None` for an unused one.
     pub(crate) fn color_formats(&self) -> &[Option<Format>] {
         let (Self::RenderPass { formats, .. }
         | Self::Dynamic { formats }

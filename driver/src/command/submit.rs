@@ -14,10 +14,10 @@ use ash::vk;
 use simdevice::CommandProcessor;
 use std::sync::Arc;
 
-/// The commands that a command buffer held when it was submitted.
+/// The commands of a command buffer at its submission.
 pub(crate) type Commands = (Arc<Vec<Command>>, PendingUse);
 
-/// A batch: semaphores to wait for, command buffers, semaphores to signal; each semaphore with a timeline's value.
+/// A batch: semaphores to wait for, command buffers, semaphores to signal. Each semaphore has a timeline's value.
 #[derive(Debug, Default)]
 pub(crate) struct Batch {
     /// The semaphores that are waited for first.
@@ -34,14 +34,14 @@ pub(crate) struct Submission {
     pub(crate) batches: Vec<Batch>,
     /// The fence that is signaled when all of them are done.
     pub(crate) fence: Option<Arc<Fence>>,
-    /// The things that are waited for on the device, and its loss.
+    /// The state that can be waited for on the device, and its loss.
     pub(crate) sync: Arc<DeviceSync>,
-    /// Who hears of what goes wrong.
+    /// The instance, to which errors are reported.
     pub(crate) instance: Arc<Instance>,
 }
 
 impl Submission {
-    /// Executes it on a queue's thread. If the device is lost on the way, everybody who waits is woken.
+    /// Executes the submission on a queue's thread. If the device is lost, all waiters are woken.
     pub(crate) fn execute(self, processor: &mut CommandProcessor) {
         let mut execution = Execution {
             processor,
@@ -85,7 +85,7 @@ fn execute_batch(batch: Batch, execution: &mut Execution<'_>) -> Result<(), Erro
     Ok(())
 }
 
-/// Hands batches to the queue's thread.
+/// Passes batches to the queue's thread.
 ///
 /// # Errors
 /// [`Error::DeviceLost`].
@@ -136,7 +136,7 @@ unsafe fn batch(info: &vk::SubmitInfo<'_>) -> Result<Batch, Error> {
     }
 }
 
-/// Pairs semaphores with a timeline's values; binary semaphores need none.
+/// Pairs semaphores with timeline values; binary semaphores need none.
 fn with_values(semaphores: Vec<Arc<Semaphore>>, values: &[u64]) -> Vec<(Arc<Semaphore>, u64)> {
     let values = values.iter().copied().chain(std::iter::repeat(0));
     semaphores.into_iter().zip(values).collect()
@@ -181,7 +181,7 @@ unsafe fn semaphores(
         .collect()
 }
 
-/// The commands that command buffers hold now.
+/// The present commands of command buffers.
 ///
 /// # Safety
 /// The handles are live.
@@ -264,7 +264,7 @@ mod tests {
             }
         }
 
-        /// Submits packets with a fence that a thread waits for, and says how that wait ended.
+        /// Submits packets with a fence that a thread waits for. Returns the end of that wait.
         fn submit(&self, commands: Vec<Command>) -> WaitResult {
             let fence = Arc::new(Fence::new(Arc::clone(&self.sync), false));
             let waiter = std::thread::spawn({

@@ -1,4 +1,4 @@
-//! Commands that synchronise.
+//! Commands for synchronization.
 
 use super::Command;
 use super::buffer::Recorder;
@@ -7,7 +7,8 @@ use crate::sync::Event;
 use simdevice::Packet;
 use std::sync::Arc;
 
-/// A barrier makes everything before it visible to everything after it, whatever it names.
+/// Records a barrier, which makes everything before it visible to everything after it, whatever stages and resources it
+/// names.
 #[doc(alias = "vkCmdPipelineBarrier")]
 #[doc(alias = "vkCmdPipelineBarrier2")]
 pub(crate) fn cmd_pipeline_barrier(recorder: &mut Recorder) -> Result<(), Error> {
@@ -42,7 +43,7 @@ fn set_event(recorder: &mut Recorder, event: &Arc<Event>, value: bool) -> Result
     Ok(())
 }
 
-/// There is one device.
+/// Does nothing: a group has only one device.
 #[doc(alias = "vkCmdSetDeviceMask")]
 pub(crate) fn cmd_set_device_mask(_recorder: &mut Recorder) -> Result<(), Error> {
     Ok(())

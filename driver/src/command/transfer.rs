@@ -1,4 +1,4 @@
-//! Commands that copy, blit, resolve and clear. Regions are converted as they are; the device refuses what lies outside an
+//! Commands that copy, blit, resolve and clear. Regions are converted unchecked; the device refuses regions outside an
 //! image.
 
 use super::buffer::Recorder;
@@ -205,15 +205,15 @@ pub(crate) fn cmd_clear_attachments(
     Ok(())
 }
 
-/// The ids of the rules that a use of an image may break.
+/// The ids of the rules on a use of an image.
 struct ImageRules {
     /// The image must be bound to memory.
     memory: &'static str,
-    /// The image must have the aspects that are named.
+    /// The image must have the named aspects.
     aspect: &'static str,
-    /// The image must have the mip levels that are named.
+    /// The image must have the named mip levels.
     level: &'static str,
-    /// The image must have the array layers that are named.
+    /// The image must have the named array layers.
     layers: &'static str,
 }
 
@@ -524,8 +524,8 @@ fn require_one_sample(vuid: &'static str, image: &Image) -> Result<(), Error> {
     }
 }
 
-/// Tells if a blit between the formats means something: signed integers, unsigned ones and everything else keep to
-/// themselves, and a depth and stencil format to itself.
+/// Reports whether a blit between the formats is allowed: signed integers, unsigned integers and other formats each
+/// convert only among themselves, and a depth and stencil format only to itself.
 fn converts(from: Format, to: Format) -> bool {
     let class = |format: Format| match format.numeric() {
         Numeric::Uint => 0,
@@ -659,7 +659,7 @@ fn subresource_range(
     }
 }
 
-/// The subresources of a copy that names exactly one aspect; the id `single` is that of the rule that it does.
+/// The subresources of a copy that must name exactly one aspect; `single` is the id of that rule.
 fn layers(
     image: &Image,
     layers: &vk::ImageSubresourceLayers,
@@ -733,14 +733,14 @@ fn no_subresource(vuid: &'static str, what: &dyn std::fmt::Debug) -> Error {
     )
 }
 
-/// An offset in texels, in the blocks that an image is stored in.
+/// Converts an offset from texels to the blocks in which an image is stored.
 fn block_offset(image: &Image, offset: vk::Offset3D) -> [i32; 3] {
-    // Valid usage has them multiples of a block's side.
+    // Valid usage requires multiples of a block's side.
     let side = image.desc.format.block_side().cast_signed();
     [offset.x / side, offset.y / side, offset.z]
 }
 
-/// An extent in texels, in the blocks that an image is stored in.
+/// Converts an extent from texels to the blocks in which an image is stored.
 fn block_extent(image: &Image, extent: vk::Extent3D) -> [u32; 3] {
     let side = image.desc.format.block_side();
     [

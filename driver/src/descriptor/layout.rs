@@ -19,11 +19,11 @@ pub(crate) struct BindingInfo {
     pub(crate) number: u32,
     /// The kind of its descriptors.
     pub(crate) kind: vk::DescriptorType,
-    /// The number of descriptors that it has; 0 reserves the number.
+    /// The number of its descriptors; 0 reserves the binding number.
     pub(crate) count: u32,
     /// The stages that may use it.
     pub(crate) stages: vk::ShaderStageFlags,
-    /// Samplers that never change, one for each descriptor; or empty.
+    /// Immutable samplers, one for each descriptor; or empty.
     pub(crate) immutable_samplers: Vec<Arc<Sampler>>,
     /// The rules on its descriptors.
     pub(crate) flags: vk::DescriptorBindingFlags,
@@ -34,17 +34,18 @@ pub(crate) struct BindingInfo {
 pub(crate) struct LayoutBinding {
     /// The kind of its descriptors.
     pub(crate) kind: vk::DescriptorType,
-    /// The number of descriptors that it has; of a variable count, the most.
+    /// The number of its descriptors; the most, if the count is variable.
     pub(crate) count: u32,
-    /// The bytes of an inline uniform block, which is one descriptor; of a variable count, the most. 0 for all other kinds.
+    /// The bytes of an inline uniform block, which is one descriptor; the most, if the count is variable. 0 for other
+    /// kinds.
     pub(crate) inline_bytes: u32,
     /// The stages that may use it.
     pub(crate) stages: vk::ShaderStageFlags,
-    /// Samplers that never change, one for each descriptor; or empty.
+    /// Immutable samplers, one for each descriptor; or empty.
     pub(crate) immutable_samplers: Vec<Arc<Sampler>>,
-    /// Its first descriptor's index in the set.
+    /// The index of its first descriptor in the set.
     pub(crate) first: usize,
-    /// Its first dynamic offset's index among the set's, if its offsets are dynamic.
+    /// The index of its first dynamic offset among the set's, if it has dynamic offsets.
     pub(crate) first_dynamic: Option<usize>,
 }
 
@@ -60,7 +61,7 @@ pub(crate) struct DescriptorSetLayout {
 
 objects! { vk::DescriptorSetLayout => DescriptorSetLayout; }
 
-/// Tells if the kind's offsets are given when the set is bound.
+/// Reports whether descriptors of this kind have dynamic offsets.
 pub(crate) fn is_dynamic(kind: vk::DescriptorType) -> bool {
     matches!(
         kind,
@@ -68,7 +69,7 @@ pub(crate) fn is_dynamic(kind: vk::DescriptorType) -> bool {
     )
 }
 
-/// Tells if the driver has descriptors of this kind.
+/// Reports whether the driver supports descriptors of this kind.
 pub(crate) fn is_supported(kind: vk::DescriptorType) -> bool {
     matches!(
         kind,
@@ -88,11 +89,10 @@ pub(crate) fn is_supported(kind: vk::DescriptorType) -> bool {
 }
 
 impl DescriptorSetLayout {
-    /// A layout of bindings, with flags that say how its sets come to be and are updated.
+    /// A layout of bindings. The flags say how its sets are allocated and updated.
     ///
-    /// # Errors
-    /// [`Error::FeatureNotPresent`] for a kind of descriptor that there isn't, or too many of them;
-    /// [`Error::InvalidUsage`] if two bindings have one number, or bindings don't go with their flags.
+    /// # Errors [`Error::FeatureNotPresent`] for an unsupported kind of descriptor, or too many of them;
+    /// [`Error::InvalidUsage`] if two bindings have the same number, or bindings contradict their flags.
     pub(crate) fn new(
         infos: Vec<BindingInfo>,
         flags: vk::DescriptorSetLayoutCreateFlags,
@@ -160,14 +160,14 @@ impl DescriptorSetLayout {
         })
     }
 
-    /// The binding whose sets choose their number of descriptors, or of bytes: the last one, if any.
+    /// The binding with a variable number of descriptors, or of bytes: the last one, if any.
     pub(crate) fn variable_binding(&self) -> Option<&LayoutBinding> {
         let last = self.bindings.values().next_back();
         last.filter(|_| self.has_variable_count)
     }
 
-    /// The kinds of a set's descriptors with how many it takes of its pool, bytes of inline uniform blocks, if it has
-    /// `variable_count` of the binding that leaves its number open.
+    /// The kinds of a set's descriptors, each with the number that it takes from its pool (bytes, for inline uniform
+    /// blocks). The variable binding has `variable_count`.
     pub(crate) fn kinds(
         &self,
         variable_count: u32,
@@ -195,29 +195,29 @@ impl DescriptorSetLayout {
         self.bindings.values()
     }
 
-    /// The number of descriptors that a set has.
+    /// The number of descriptors in a set.
     pub(crate) fn count(&self) -> usize {
         self.count
     }
 
-    /// The number of dynamic offsets that a set takes.
+    /// The number of dynamic offsets of a set.
     pub(crate) fn dynamic_count(&self) -> usize {
         self.dynamic_count
     }
 
-    /// Tells if its sets are pushed rather than allocated.
+    /// Reports whether its sets are pushed rather than allocated.
     pub(crate) fn is_push(&self) -> bool {
         self.flags
             .contains(vk::DescriptorSetLayoutCreateFlags::PUSH_DESCRIPTOR_KHR)
     }
 
-    /// Tells if its sets may be updated after they were bound.
+    /// Reports whether its sets may be updated after they are bound.
     pub(crate) fn is_updated_after_bind(&self) -> bool {
         self.flags
             .contains(vk::DescriptorSetLayoutCreateFlags::UPDATE_AFTER_BIND_POOL)
     }
 
-    /// The index in the set of element `element` of binding `number`, which may lie beyond the binding.
+    /// The index in the set of element `element` of binding `number`, which may be beyond the binding.
     ///
     /// # Errors
     /// [`Error::InvalidUsage`] if there is no such binding.
@@ -233,7 +233,7 @@ impl DescriptorSetLayout {
     }
 }
 
-/// Checks that bindings go with their flags and with those of their layout.
+/// Checks that bindings agree with their flags and with those of their layout.
 fn check_flags(
     infos: &[BindingInfo],
     flags: vk::DescriptorSetLayoutCreateFlags,
@@ -307,7 +307,7 @@ fn check_flags(
     Ok(())
 }
 
-/// The layout that a create info asks for.
+/// The layout of a create info.
 ///
 /// # Safety
 /// The create info and its chain are valid.
@@ -363,7 +363,7 @@ unsafe fn new_layout(
     }
 }
 
-/// A binding with its pointers followed.
+/// Follows the pointers of a binding.
 ///
 /// # Safety
 /// The binding is valid.
@@ -413,11 +413,11 @@ pub(crate) unsafe fn get_descriptor_set_layout_support(
 ) -> Result<(), Error> {
     // SAFETY: the caller's promise.
     let layout = unsafe { new_layout(create_info) };
-    // A layout that is refused for another reason than its size has no answer but this.
+    // A layout that is refused for another reason than its size is reported as unsupported, too.
     let most = limits::MAX_PER_SET_DESCRIPTORS as usize;
     let layout = layout.ok().filter(|layout| layout.count() <= most);
     support.supported = layout.is_some().into();
-    // A binding of a variable count may have as many as the layout says, since the layout is supported.
+    // The layout is supported, so its variable binding may have as many descriptors as it says.
     let variable = layout.as_ref().and_then(|layout| layout.variable_binding());
     let max_variable_count = variable.map_or(0, |binding| binding.count.max(binding.inline_bytes));
     support.for_each_chained(|mut structure| {

@@ -1,7 +1,7 @@
-//! Descriptors: layouts, the pools that sets come from, sets with their descriptors, and update templates.
+//! Descriptors: layouts, the pools from which sets are allocated, sets with their descriptors, and update templates.
 //!
-//! A set is a flat array: its layout gives each binding a run of it, in order of binding numbers. So an update that
-//! spills over into the next binding, as Vulkan allows, just goes on.
+//! A set is a flat array: its layout gives each binding a range of it, in order of binding numbers. So an update that
+//! continues in the next binding, as Vulkan allows, needs no special case.
 
 pub(crate) mod layout;
 pub(crate) mod pool;

@@ -10,7 +10,7 @@ use std::collections::{HashMap, HashSet};
 use std::mem::MaybeUninit;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// A descriptor pool. It owns the handles of its sets, and gives no more than it was made for.
+/// A descriptor pool. It owns the handles of its sets, and allocates no more than its maximum.
 #[derive(Debug)]
 pub(crate) struct DescriptorPool {
     max_sets: usize,
@@ -19,7 +19,7 @@ pub(crate) struct DescriptorPool {
     allocated: Mutex<Allocated>,
 }
 
-/// The sets that a pool has given, and how many descriptors of each kind they have.
+/// The allocated sets, and the number of their descriptors of each kind.
 #[derive(Debug, Default)]
 struct Allocated {
     sets: HashSet<vk::DescriptorSet>,
@@ -29,7 +29,7 @@ struct Allocated {
 objects! { vk::DescriptorPool => DescriptorPool; }
 
 impl DescriptorPool {
-    /// A pool of at most `max_sets` sets with descriptors of at most these sizes together.
+    /// A pool of at most `max_sets` sets, with at most these numbers of descriptors together.
     pub(crate) fn new(
         max_sets: u32,
         pool_sizes: &[vk::DescriptorPoolSize],
@@ -53,11 +53,10 @@ impl DescriptorPool {
             .unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Makes a set of each layout, with as many descriptors of the binding that leaves their number open as
-    /// `variable_counts` says, or none.
+    /// Allocates a set of each layout, with the number of descriptors of its variable binding from `variable_counts`,
+    /// or none.
     ///
-    /// # Errors
-    /// [`Error::OutOfPoolMemory`], or [`Error::OutOfDeviceMemory`] for the bytes of inline uniform blocks;
+    /// # Errors [`Error::OutOfPoolMemory`], or [`Error::OutOfDeviceMemory`] for the bytes of inline uniform blocks;
     /// [`Error::InvalidUsage`] if sets of the layout are updated after bind and those of the pool are not.
     pub(crate) fn allocate(
         &self,
@@ -105,10 +104,10 @@ impl DescriptorPool {
         Ok(sets)
     }
 
-    /// Frees sets of this pool; null is allowed.
+    /// Frees sets of this pool. Null handles are ignored.
     ///
-    /// # Errors
-    /// [`Error::InvalidUsage`] if sets of this pool are not freed singly, or one is not of this pool; it is left alone.
+    /// # Errors [`Error::InvalidUsage`] if sets of this pool are not freed individually, or one is not of this pool; it
+    /// is not freed.
     ///
     /// # Safety
     /// Nothing uses the handles any more.
@@ -129,7 +128,7 @@ impl DescriptorPool {
                     "a descriptor set is not of the pool",
                 ));
             }
-            // SAFETY: the pool made the handle and has not destroyed it, and the caller uses it no more.
+            // SAFETY: the pool made the handle and has not destroyed it, and the caller no longer uses it.
             if let Some(set) = unsafe { handle::destroy(set) }? {
                 for (kind, count) in set.layout().kinds(set.variable_count()) {
                     let taken = allocated.descriptors.entry(kind).or_default();
@@ -142,15 +141,14 @@ impl DescriptorPool {
 
     /// Frees every set.
     ///
-    /// # Errors
-    /// None but of a defect.
+    /// # Errors None, unless the driver has a defect.
     ///
     /// # Safety
     /// Nothing uses the handles of the pool's sets any more.
     pub(crate) unsafe fn reset(&self) -> Result<(), Error> {
         let allocated = std::mem::take(&mut *self.lock());
         for set in allocated.sets {
-            // SAFETY: the pool made the handle and has not destroyed it, and the caller uses it no more.
+            // SAFETY: the pool made the handle and has not destroyed it, and the caller no longer uses it.
             unsafe { handle::destroy(set) }?;
         }
         Ok(())
@@ -187,7 +185,7 @@ pub(crate) unsafe fn reset_descriptor_pool(descriptor_pool: &DescriptorPool) -> 
     unsafe { descriptor_pool.reset() }
 }
 
-/// Allocates sets; all are null if any fails.
+/// Allocates sets. All are null if one fails.
 ///
 /// # Safety
 /// The allocate info and its handles are valid.

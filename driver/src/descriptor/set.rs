@@ -17,7 +17,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 /// An element of a descriptor set.
 #[derive(Clone, Debug, Default)]
 pub(crate) enum Descriptor {
-    /// Nothing: programs read zero from it.
+    /// Nothing: programs read zero.
     #[default]
     Empty,
     /// A uniform or storage buffer.
@@ -38,12 +38,12 @@ pub(crate) enum Descriptor {
 pub(crate) struct BufferDescriptor {
     /// The bytes from the descriptor's offset to the end of the buffer.
     pub(crate) rest: BufferRange,
-    /// The number of them that count; `None` (`VK_WHOLE_SIZE`) for all.
+    /// The number of these bytes that are used; `None` (`VK_WHOLE_SIZE`) for all.
     pub(crate) size: Option<u64>,
 }
 
 impl BufferDescriptor {
-    /// The bytes that a program may reach, with a dynamic offset. They never go beyond the buffer.
+    /// The bytes that a program may access, with a dynamic offset. They never exceed the buffer.
     pub(crate) fn range(&self, dynamic_offset: u32) -> BufferRange {
         let offset = u64::from(dynamic_offset).min(self.rest.size);
         let rest = self.rest.size - offset;
@@ -63,12 +63,12 @@ pub(crate) struct DescriptorSet {
     descriptors: Mutex<Vec<Descriptor>>,
 }
 
-/// An update of consecutive descriptors: its contents are already converted.
+/// An update of consecutive descriptors, already converted.
 #[derive(Clone, Debug)]
 pub(crate) struct Write {
     /// The first binding.
     pub(crate) binding: u32,
-    /// The first element of it.
+    /// The first element of that binding.
     pub(crate) element: u32,
     /// The kind of the descriptors.
     pub(crate) kind: vk::DescriptorType,
@@ -84,8 +84,8 @@ objects! {
 }
 
 impl DescriptorSet {
-    /// A set that holds nothing but immutable samplers and inline uniform blocks of zeros. It has `variable_count`
-    /// descriptors, or bytes, of the binding that leaves their number open.
+    /// A set that holds only immutable samplers and inline uniform blocks of zeros. Its variable binding has
+    /// `variable_count` descriptors, or bytes.
     ///
     /// # Errors
     /// [`Error::OutOfDeviceMemory`] if there is no memory for inline uniform blocks.
@@ -126,7 +126,7 @@ impl DescriptorSet {
         })
     }
 
-    /// The number of descriptors, or of bytes, of the binding that leaves their number open.
+    /// The number of descriptors, or of bytes, of its variable binding.
     pub(crate) fn variable_count(&self) -> u32 {
         self.variable_count
     }
@@ -145,8 +145,8 @@ impl DescriptorSet {
 
     /// Replaces descriptors.
     ///
-    /// # Errors
-    /// [`Error::InvalidUsage`], and nothing is replaced, if the set does not have them, or has others.
+    /// # Errors [`Error::InvalidUsage`], and nothing is replaced, if the set does not have these descriptors, or they
+    /// are of another kind.
     pub(crate) fn write(&self, write: &Write) -> Result<(), Error> {
         if write.kind == vk::DescriptorType::INLINE_UNIFORM_BLOCK {
             let block = self.inline_block(write.binding)?;
@@ -190,8 +190,7 @@ impl DescriptorSet {
 
     /// Replaces `count` descriptors by those of another set, or of another part of this one.
     ///
-    /// # Errors
-    /// [`Error::InvalidUsage`], and nothing is replaced, if either set does not have them.
+    /// # Errors [`Error::InvalidUsage`], and nothing is replaced, if either set does not have these descriptors.
     pub(crate) fn copy(
         &self,
         (binding, element): (u32, u32),
@@ -238,10 +237,9 @@ impl DescriptorSet {
         })
     }
 
-    /// The bytes of the inline uniform block that a binding is.
+    /// The bytes of the inline uniform block of a binding.
     ///
-    /// # Errors
-    /// [`Error::InvalidUsage`] if the binding is none.
+    /// # Errors [`Error::InvalidUsage`] if the binding is not an inline uniform block.
     fn inline_block(&self, binding: u32) -> Result<BufferRange, Error> {
         let found = self.layout.binding(binding);
         let block = found.filter(|binding| binding.inline_bytes > 0);
@@ -263,7 +261,7 @@ impl DescriptorSet {
     }
 }
 
-/// The descriptor of an inline uniform block of so many bytes, in memory of its own.
+/// The descriptor of an inline uniform block of `bytes` bytes, in memory of its own.
 fn inline_block(bytes: u32) -> Result<Descriptor, Error> {
     let size = u64::from(bytes);
     let memory = Allocation::new_zeroed(size.max(1))
@@ -280,8 +278,7 @@ fn inline_block(bytes: u32) -> Result<Descriptor, Error> {
 
 /// Reads or writes `count` bytes of an inline uniform block from byte `start` on.
 ///
-/// # Errors
-/// [`Error::InvalidUsage`] if the block does not have them.
+/// # Errors [`Error::InvalidUsage`] if the block does not have these bytes.
 fn in_block<E>(
     block: &BufferRange,
     start: u32,
@@ -302,7 +299,7 @@ fn in_block<E>(
     ))
 }
 
-/// Replaces a descriptor; an immutable sampler stays.
+/// Replaces a descriptor, but keeps an immutable sampler.
 fn replace(place: &mut Descriptor, new: Descriptor, immutable: bool) {
     match (place, new) {
         (Descriptor::Image { view, .. }, Descriptor::Image { view: new, .. }) if immutable => {
@@ -315,14 +312,14 @@ fn replace(place: &mut Descriptor, new: Descriptor, immutable: bool) {
 /// A descriptor update template.
 #[derive(Debug)]
 pub(crate) struct UpdateTemplate {
-    /// The entries: what is updated, and where it lies in the application's data.
+    /// The entries: the updated descriptors, and the places of their contents in the application's data.
     pub(crate) entries: Vec<vk::DescriptorUpdateTemplateEntry>,
-    /// For templates of pushed descriptors: the bind point that they are pushed to.
+    /// The bind point, for templates of pushed descriptors.
     pub(crate) push_bind_point: Option<vk::PipelineBindPoint>,
 }
 
-/// Updates descriptors. There is no result to return, so that the device is lost where memory is wanting: what is drawn
-/// with them would be something else.
+/// Updates descriptors. The command returns no result, so the device is lost if memory is lacking: draws with the set
+/// would give wrong results.
 fn update(device: &Device, body: impl FnOnce() -> Result<(), Error>) -> Result<(), Error> {
     host::catch(body).unwrap_or_else(|memory| {
         device.sync().lose(&memory.to_string());
@@ -330,7 +327,7 @@ fn update(device: &Device, body: impl FnOnce() -> Result<(), Error>) -> Result<(
     })
 }
 
-/// A write to a set of a layout, with its pointers followed and its objects looked up.
+/// Converts a write to a set of a layout: follows its pointers and looks up its objects.
 ///
 /// # Safety
 /// The write is valid.
@@ -382,7 +379,7 @@ pub(crate) unsafe fn write(
     })
 }
 
-/// The writes to a set of a layout that a template makes of the application's data.
+/// The writes to a set of a layout by a template with the application's data.
 ///
 /// # Safety
 /// The data is what the template describes.
@@ -398,7 +395,7 @@ pub(crate) unsafe fn template_writes(
     }
     let write = |entry: &vk::DescriptorUpdateTemplateEntry| {
         if entry.descriptor_type == vk::DescriptorType::INLINE_UNIFORM_BLOCK {
-            // SAFETY: the caller's promise: the entry's offset leads to so many bytes.
+            // SAFETY: the caller's promise: the bytes of the entry are at its offset.
             let bytes = unsafe {
                 let start = data.byte_add(entry.offset).cast::<u8>();
                 valid::slice(start, entry.descriptor_count)?
@@ -436,7 +433,7 @@ pub(crate) unsafe fn template_writes(
     Ok(writes)
 }
 
-/// The structure that describes a descriptor, and the parts of it that count.
+/// The structure that describes a descriptor, and the parts of it that are used.
 #[derive(Clone, Copy)]
 enum DescriptorSource {
     Image { view: bool, sampler: bool },
@@ -524,10 +521,9 @@ unsafe fn descriptors(
     Ok(all)
 }
 
-/// An image's view and a sampler, as far as they count; what doesn't may be anything.
+/// An image's view and a sampler, if they are used; the others may be invalid.
 ///
-/// # Safety
-/// The handles that count are live.
+/// # Safety The handles that are used are live.
 unsafe fn image(
     view: bool,
     sampler: bool,

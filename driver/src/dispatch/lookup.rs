@@ -8,10 +8,10 @@ use std::collections::HashMap;
 use std::ffi::CStr;
 use std::sync::OnceLock;
 
-/// The kind of a command's first parameter, which decides who may look it up.
+/// The kind of a command's first parameter, which decides through which object the command may be looked up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Scope {
-    /// Before there is an instance.
+    /// No object: the command is called before there is an instance.
     Global,
     Instance,
     PhysicalDevice,
@@ -19,14 +19,15 @@ pub(super) enum Scope {
     Device,
 }
 
-/// The condition under which a command is there.
+/// The condition under which a command is available.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Availability {
     /// A core version.
     Core(u32),
-    /// An enabled instance extension, one of these.
+    /// One of these instance extensions is enabled.
     InstanceExtension(&'static [&'static CStr]),
-    /// A device extension, one of these: enabled, when looked up for a device; supported, when looked up for an instance.
+    /// One of these device extensions is enabled, when looked up for a device; or supported, when looked up for an
+    /// instance.
     DeviceExtension(&'static [&'static CStr]),
 }
 
@@ -64,7 +65,7 @@ pub(super) use rows;
 pub(super) struct Commands {
     /// The rows.
     pub(super) rows: &'static [Command],
-    /// Rows by name. A command may be reached through several availabilities only under several names.
+    /// Rows by name. A command that is available for several reasons has a name for each.
     by_name: OnceLock<HashMap<&'static [u8], &'static Command>>,
 }
 
@@ -93,9 +94,9 @@ impl Commands {
             .map(|command| command.function)
     }
 
-    /// `vkGetInstanceProcAddr` of an instance: its own commands, and those of every device that it could have, whose
-    /// `device_extensions` are all that are supported. A device's core commands are there whatever version the instance
-    /// asked for, as its devices have them.
+    /// `vkGetInstanceProcAddr` of an instance: its own commands, and those of all devices, whose `device_extensions`
+    /// are all that are supported. All core commands of devices are found, whatever version the instance requested,
+    /// because devices have them.
     pub(super) fn instance_command(
         &self,
         name: &CStr,

@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use std::ffi::c_void;
 use std::ptr;
 
-/// Runs one of ash's loaders and returns the names of the commands that it asks for.
+/// Runs one of ash's loaders. Returns the names of the commands that it looks up.
 fn names_loaded<T>(load: impl FnOnce(&mut dyn FnMut(&CStr) -> *const c_void) -> T) -> Vec<String> {
     let mut names = Vec::new();
     load(&mut |name| {
@@ -31,7 +31,8 @@ fn scope_and_version(name: &str) -> Option<(Scope, u32)> {
     }
 }
 
-/// ash aborts the process when an application calls a core command that it didn't find.
+/// Tests the commands that ash loads: ash aborts the process when an application calls a core command that it didn't
+/// find.
 #[test]
 fn every_core_command_that_ash_loads_is_there() {
     let (v10, v11, v12, v13) = (
@@ -91,7 +92,7 @@ fn every_core_command_that_ash_loads_is_there() {
     }
 }
 
-/// The commands of the extensions that are advertised.
+/// Tests the commands of the advertised extensions.
 #[test]
 fn every_command_of_an_advertised_extension_is_there() {
     let mut names = names_loaded(|f| ash::ext::debug_utils::InstanceFn::load(f));
@@ -114,7 +115,7 @@ fn every_command_of_an_advertised_extension_is_there() {
     names.extend(names_loaded(|f| {
         gaurast::gaussian_primitive_topology::DeviceFn::load(f)
     }));
-    // ash adds what other vendors' extensions would, together with ours.
+    // ash also loads commands of other vendors' extensions.
     let is_ours = |name: &String| !name.ends_with("AMD") && !name.ends_with("NV");
     for name in names.into_iter().filter(is_ours) {
         let command = find_by(&name).unwrap_or_else(|| panic!("{name}"));

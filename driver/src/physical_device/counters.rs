@@ -1,14 +1,14 @@
-//! The device's counters as `VK_KHR_performance_query` presents them, in the order of [`Counter::ALL`].
+//! The device's counters for `VK_KHR_performance_query`, in the order of [`Counter::ALL`].
 
 use crate::convert;
 use ash::vk;
 use simdevice::stats::counters::{Counter, Unit};
 use std::ffi::{CString, c_char};
 
-/// The number of counters that there are.
+/// The number of counters.
 pub(crate) const COUNT: usize = Counter::ALL.len();
 
-/// Writes what counter `index` is and how it is stored.
+/// Writes the unit, scope, storage and UUID of counter `index`.
 pub(crate) fn fill(index: usize, out: &mut vk::PerformanceCounterKHR<'_>) {
     let info = Counter::ALL[index].info();
     out.unit = match info.unit {
@@ -26,10 +26,10 @@ pub(crate) fn fill(index: usize, out: &mut vk::PerformanceCounterKHR<'_>) {
     out.uuid = uuid(info.category, info.name);
 }
 
-/// Writes what people read of counter `index`.
+/// Writes the texts that describe counter `index`.
 pub(crate) fn describe(index: usize, out: &mut vk::PerformanceCounterDescriptionKHR<'_>) {
     let info = Counter::ALL[index].info();
-    // The model runs only where one of its counters is asked for.
+    // The hardware model runs only if one of its counters is requested.
     out.flags = if Counter::ALL[index].is_simulated() {
         vk::PerformanceCounterDescriptionFlagsKHR::PERFORMANCE_IMPACTING
     } else {
@@ -44,7 +44,7 @@ pub(crate) fn describe(index: usize, out: &mut vk::PerformanceCounterDescription
     }
 }
 
-/// A UUID of the counter's names, so that it stays when counters are added (128-bit FNV-1a).
+/// A UUID from the counter's names, which stays the same when counters are added (128-bit FNV-1a).
 fn uuid(category: &str, name: &str) -> [u8; vk::UUID_SIZE] {
     const OFFSET: u128 = 0x6c62_272e_07bb_0142_62b8_2175_6295_c58d;
     const PRIME: u128 = 0x0000_0000_0100_0000_0000_0000_0000_013b;

@@ -1,19 +1,18 @@
-//! The environment variables that choose how devices work. They are read here and nowhere else, when a device is
-//! created.
+//! The environment variables that configure devices. They are read only here, when a device is created.
 //!
 //! - `GAURAST_SIMD`: the SIMD level, by name: best (the default), sse2, avx2 or avx512.
-//! - `GAURAST_THREADS`: how many worker threads a device has; 0 (the default) means one per processor.
-//! - `GAURAST_TIMEOUT_MS`: how many milliseconds one batch of shader invocations may take before the device is lost; a
-//!   loop without end is stopped so. A batch is a workgroup, 128 vertices, or 64 or 256 fragments.
-//! - `GAURAST_OPTIMIZATIONS`: the work that is left out where it changes no image: all (the default), none, or names separated by
-//!   commas (see [`simdevice::stats::optimizations`]).
-//! - `GAURAST_TRACE`: a file that the work of a device's last 64 render passes is written to, as JSON, when the device is
-//!   gone; `gaurast simulate` reads it. It costs a little time and changes no image.
-//! - `GAURAST_TIMESTAMPS`: whose nanoseconds timestamps count: host (the default) or simulated, those that the paper's
-//!   hardware would have spent since the device was created. Vulkan has no time domain for such a clock
-//!   (`VK_KHR_calibrated_timestamps` knows the device's and the host's), so that no application asks for it by
+//! - `GAURAST_THREADS`: the number of worker threads of a device; 0 (the default) means one per processor.
+//! - `GAURAST_TIMEOUT_MS`: the milliseconds that one batch of shader invocations may take before the device is lost, so
+//!   that a loop without end is stopped. A batch is a workgroup, 128 vertices, or 64 or 256 fragments.
+//! - `GAURAST_OPTIMIZATIONS`: the work that is skipped because it changes no image: all (the default), none, or names
+//!   separated by commas (see [`simdevice::stats::optimizations`]).
+//! - `GAURAST_TRACE`: a file to which the work of a device's last 64 render passes is written, as JSON, when the device
+//!   is destroyed; `gaurast simulate` reads it. It costs a little time and changes no image.
+//! - `GAURAST_TIMESTAMPS`: the clock of timestamps: host (the default) or simulated, which counts the nanoseconds that
+//!   the paper's hardware would have spent since the device was created. Vulkan has no time domain for such a clock
+//!   (`VK_KHR_calibrated_timestamps` knows the device's and the host's), so that no application requests it by
 //!   accident.
-//! - `GAURAST_DUMP`: what is printed to standard error for people, by name: ir (the device's programs, as pipelines are
+//! - `GAURAST_DUMP`: the text that is printed to standard error, by name: ir (the device's programs, when pipelines are
 //!   created).
 
 use super::memory;
@@ -26,7 +25,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// The heap's size is so many times what chunks of Gaussians may take of host memory beside it.
+/// The ratio of the heap's size to the budget of host memory for chunks of Gaussians.
 const HEAP_PER_CLUSTER_BUDGET: u64 = 8;
 
 const SIMD: &str = "GAURAST_SIMD";
@@ -37,10 +36,9 @@ const TRACE: &str = "GAURAST_TRACE";
 const TIMESTAMPS: &str = "GAURAST_TIMESTAMPS";
 const DUMP: &str = "GAURAST_DUMP";
 
-/// Opens a simulated device as the environment says.
+/// Opens a simulated device with the configuration from the environment.
 ///
-/// # Errors
-/// [`Error::InitializationFailed`] for a value that means nothing or that this machine can't satisfy.
+/// # Errors [`Error::InitializationFailed`] for a value that is invalid or that this machine can't satisfy.
 pub(crate) fn open_device() -> Result<simdevice::Device, Error> {
     let mut config = config(
         variable(SIMD)?.as_deref(),
@@ -58,7 +56,7 @@ pub(crate) fn open_device() -> Result<simdevice::Device, Error> {
     simdevice::Device::new(&config).map_err(|error| Error::InitializationFailed(error.to_string()))
 }
 
-/// Tells if timestamps count the simulated hardware's time.
+/// Reports whether timestamps count the simulated hardware's time.
 fn simulated_timestamps(name: &str) -> Result<bool, Error> {
     match name {
         "" | "host" => Ok(false),
@@ -69,7 +67,7 @@ fn simulated_timestamps(name: &str) -> Result<bool, Error> {
     }
 }
 
-/// Writes a trace; whoever asked for it is told if that fails.
+/// Writes a trace. A failure is logged.
 fn write_trace(file: &Path, trace: &Trace) {
     let written = serde_json::to_vec(trace)
         .map_err(std::io::Error::from)
@@ -79,17 +77,16 @@ fn write_trace(file: &Path, trace: &Trace) {
     }
 }
 
-/// The things that are printed for people.
+/// The things that are printed for readers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Dump {
-    /// The device's programs, as pipelines are created.
+    /// True to print the device's programs when pipelines are created.
     pub(crate) ir: bool,
 }
 
-/// The things that the environment wants printed.
+/// The things that the environment asks to print.
 ///
-/// # Errors
-/// [`Error::InitializationFailed`] for a name that means nothing.
+/// # Errors [`Error::InitializationFailed`] for an unknown name.
 pub(crate) fn dump() -> Result<Dump, Error> {
     parse_dump(variable(DUMP)?.as_deref().unwrap_or_default())
 }
@@ -119,7 +116,7 @@ fn variable(name: &str) -> Result<Option<String>, Error> {
     }
 }
 
-/// The configuration that the variables' values choose.
+/// The configuration from the values of the variables.
 fn config(
     simd: Option<&str>,
     threads: Option<&str>,

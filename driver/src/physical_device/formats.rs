@@ -1,4 +1,4 @@
-//! What each format can be used for. The formats themselves, and how texels are stored, are the device's.
+//! The features of each format. The formats themselves, and the storage of texels, are the device's.
 
 #[cfg(test)]
 mod required;
@@ -14,7 +14,7 @@ use std::sync::LazyLock;
 
 /// The device's format of the same name, if it has one.
 pub(crate) fn device_format(format: vk::Format) -> Option<Format> {
-    /// By the values of Vulkan's core formats, which are consecutive.
+    /// The formats by the values of Vulkan's core formats, which are consecutive.
     static FORMATS: LazyLock<Vec<Option<Format>>> = LazyLock::new(|| {
         (0..=vk::Format::BC7_SRGB_BLOCK.as_raw())
             .map(|raw| named(&format!("{:?}", vk::Format::from_raw(raw))))
@@ -40,17 +40,18 @@ fn is_color(format: Format) -> bool {
     format.aspects() == [Aspect::Color]
 }
 
-/// Tells if components are integers that are read as floating point: these are attributes of vertices only.
+/// Reports whether components are integers that are read as floating point. Such formats are for vertex attributes
+/// only.
 fn is_scaled(format: Format) -> bool {
     matches!(format.numeric(), Numeric::Uscaled | Numeric::Sscaled)
 }
 
-/// Tells if texels are stored in compressed blocks.
+/// Reports whether texels are stored in compressed blocks.
 fn is_compressed(format: Format) -> bool {
     format.decompressed().is_some()
 }
 
-/// The features of formats whose texels can be mixed, or compared with each other.
+/// The features of formats whose texels can be filtered, or compared with each other.
 const FILTERED: vk::FormatFeatureFlags = vk::FormatFeatureFlags::from_raw(
     vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR.as_raw()
         | vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_MINMAX.as_raw(),
@@ -94,26 +95,25 @@ fn image_features(format: Format) -> vk::FormatFeatureFlags {
     features
 }
 
-/// Tells if programs write texels of a colour format. sRGB and shared exponents are only read.
+/// Reports whether programs can write texels of a colour format. sRGB and shared exponents are only read.
 fn is_stored(format: Format) -> bool {
     !matches!(format.numeric(), Numeric::Srgb | Numeric::SharedExponent)
         && format.texel_size().is_power_of_two()
         && !format.has(Channel::X)
 }
 
-/// Tells if programs update texels atomically: integers of one word.
+/// Reports whether programs can update texels atomically: integers of one word.
 fn is_atomic(format: Format) -> bool {
     format.is_integer() && format.texel_size() == 4 && format.components().len() == 1
 }
 
-/// Tells if texels of a colour format are rendered to. Formats of three equal components make poor attachments:
-/// hardware has none.
+/// Reports whether a colour format can be rendered to. Formats of three equal components can't, as on other hardware.
 fn is_rendered(format: Format) -> bool {
     format.numeric() != Numeric::SharedExponent && format.texel_size().is_power_of_two()
 }
 
-/// The features of buffers of the format: any colour is a vertex attribute, unless it takes more than its component to
-/// know one. Programs read texels of any format.
+/// The features of buffers of the format. Any colour format can be a vertex attribute, unless a component's value
+/// depends on more than its own bits. Programs can read texels of any format.
 fn buffer_features(format: Format) -> vk::FormatFeatureFlags {
     if !is_color(format) || is_compressed(format) {
         return vk::FormatFeatureFlags::empty();
@@ -134,7 +134,7 @@ fn buffer_features(format: Format) -> vk::FormatFeatureFlags {
     features
 }
 
-/// `VkFormatProperties`. Formats that the device lacks can do nothing.
+/// `VkFormatProperties`. Formats that the device lacks have no features.
 pub(crate) fn properties(format: vk::Format) -> vk::FormatProperties {
     let Some(format) = device_format(format) else {
         return vk::FormatProperties::default();
@@ -151,12 +151,12 @@ pub(crate) fn properties(format: vk::Format) -> vk::FormatProperties {
     }
 }
 
-/// The 64-bit features that go with 32-bit ones: `VkFormatProperties3`.
+/// `VkFormatProperties3`: the 64-bit features that correspond to 32-bit ones.
 pub(crate) fn features2(
     format: vk::Format,
     features: vk::FormatFeatureFlags,
 ) -> vk::FormatFeatureFlags2 {
-    // They begin with the 32-bit ones.
+    // The 64-bit features begin with the 32-bit ones.
     let mut wide = vk::FormatFeatureFlags2::from_raw(features.as_raw().into());
     let stored =
         vk::FormatFeatureFlags::STORAGE_IMAGE | vk::FormatFeatureFlags::STORAGE_TEXEL_BUFFER;
@@ -171,7 +171,7 @@ pub(crate) fn features2(
     wide
 }
 
-/// The flags that images may be created with.
+/// The flags with which images may be created.
 const IMAGE_FLAGS: vk::ImageCreateFlags = vk::ImageCreateFlags::from_raw(
     vk::ImageCreateFlags::MUTABLE_FORMAT.as_raw()
         | vk::ImageCreateFlags::EXTENDED_USAGE.as_raw()
@@ -180,7 +180,7 @@ const IMAGE_FLAGS: vk::ImageCreateFlags = vk::ImageCreateFlags::from_raw(
         | vk::ImageCreateFlags::TYPE_2D_ARRAY_COMPATIBLE.as_raw(),
 );
 
-/// The features that usages need; other usages are not supported.
+/// The features that usages require; other usages are not supported.
 const USAGES: &[(vk::ImageUsageFlags, vk::FormatFeatureFlags)] = &[
     (
         vk::ImageUsageFlags::TRANSFER_SRC,
@@ -210,14 +210,14 @@ const USAGES: &[(vk::ImageUsageFlags, vk::FormatFeatureFlags)] = &[
         vk::ImageUsageFlags::INPUT_ATTACHMENT,
         vk::FormatFeatureFlags::SAMPLED_IMAGE,
     ),
-    // Its contents live in the tile buffers and never matter outside; it goes with an attachment usage.
+    // A transient attachment's contents stay in the tile buffers; the flag is used with an attachment usage.
     (
         vk::ImageUsageFlags::TRANSIENT_ATTACHMENT,
         vk::FormatFeatureFlags::empty(),
     ),
 ];
 
-/// The features of which an input attachment's format must have one: shaders read nothing that is not rendered to.
+/// The features of which an input attachment's format must have one: shaders read only what can be rendered to.
 const ATTACHMENT: vk::FormatFeatureFlags = vk::FormatFeatureFlags::from_raw(
     vk::FormatFeatureFlags::COLOR_ATTACHMENT.as_raw()
         | vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT.as_raw(),
@@ -234,7 +234,7 @@ fn supports_usage(features: vk::FormatFeatureFlags, usage: vk::ImageUsageFlags) 
     supported.contains(usage)
 }
 
-/// The description of an image that may be asked for.
+/// The description of a queried image.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ImageQuery {
     /// Its format.
@@ -249,10 +249,9 @@ pub(crate) struct ImageQuery {
     pub(crate) flags: vk::ImageCreateFlags,
 }
 
-/// `VkImageFormatProperties`: how large such an image may be.
+/// `VkImageFormatProperties`: the limits of such an image.
 ///
-/// # Errors
-/// [`Error::FormatNotSupported`] if there can be no such image.
+/// # Errors [`Error::FormatNotSupported`] if no such image is supported.
 pub(crate) fn image_properties(query: ImageQuery) -> Result<vk::ImageFormatProperties, Error> {
     let refuse = |what: String| Err(Error::FormatNotSupported(what));
     let ImageQuery {

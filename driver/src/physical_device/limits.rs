@@ -1,7 +1,7 @@
 //! The physical device's properties and limits.
 //!
-//! Limits are at least what Vulkan requires. [`Properties`] has a field for each property of the core version and of the
-//! extensions that are listed: each is stated here, and nowhere else.
+//! Limits are at least Vulkan's required ones. [`Properties`] has a field for each property of the core version and of
+//! the listed extensions: each is defined only here.
 
 use super::memory;
 use crate::convert;
@@ -22,16 +22,16 @@ const DRIVER_INFO: &CStr =
         Err(_) => c"",
     };
 
-/// No vendor id is registered for this driver.
+/// The vendor id; none is registered for this driver.
 const VENDOR_ID: u32 = 0;
 
-/// The first and only device of its vendor.
+/// The device id, of the vendor's only device.
 const DEVICE_ID: u32 = 1;
 
-/// The most Gaussians of one draw or one sorted set: they are numbered by 32 bits.
+/// The most Gaussians of one draw or one sorted set: their numbers have 32 bits.
 const MAX_GAUSSIANS: u64 = u32::MAX as u64;
 
-/// The greatest degree of spherical harmonics that a pipeline may ask for.
+/// The greatest degree of spherical harmonics of a pipeline.
 pub(crate) const MAX_SPHERICAL_HARMONICS_DEGREE: u32 = 4;
 
 /// The greatest extent of an image in two dimensions, and of framebuffers and viewports.
@@ -43,13 +43,13 @@ pub(crate) const MAX_IMAGE_DIMENSION_3D: u32 = 4096;
 /// The most array layers of an image or framebuffer.
 pub(crate) const MAX_LAYERS: u32 = 2048;
 
-/// The steps of points' and lines' sizes: those of coordinates.
+/// The granularity of points' and lines' sizes, which is that of coordinates.
 const SIZE_GRANULARITY: f32 = 1.0 / 256.0;
 
-/// The most clip and cull distances, together and each.
+/// The most clip and cull distances, of each kind and together.
 const MAX_CLIP_CULL_DISTANCES: u32 = simdevice::limits::MAX_CLIP_CULL_DISTANCES as u32;
 
-/// The samples that texels of attachments may have.
+/// The sample counts of attachments.
 pub(crate) const SAMPLE_COUNTS: vk::SampleCountFlags = vk::SampleCountFlags::from_raw(
     vk::SampleCountFlags::TYPE_1.as_raw() | vk::SampleCountFlags::TYPE_4.as_raw(),
 );
@@ -60,44 +60,44 @@ pub(crate) const MAX_COLOR_ATTACHMENTS: u32 = 8;
 /// The greatest magnitude of a sampler's bias of the level of detail.
 pub(crate) const MAX_SAMPLER_LOD_BIAS: f32 = simdevice::limits::MAX_LOD_BIAS;
 
-/// The most samples along a pixel's footprint.
+/// The most samples along a pixel's footprint, for anisotropic filtering.
 pub(crate) const MAX_SAMPLER_ANISOTROPY: f32 = 16.0;
 
 /// The bytes of push constants.
 pub(crate) const MAX_PUSH_CONSTANTS_SIZE: u32 = 256;
 
-/// The most descriptors of a set that is pushed.
+/// The most descriptors of a pushed set.
 pub(crate) const MAX_PUSH_DESCRIPTORS: u32 = 32;
 
-/// The most descriptors of a set of any mix of kinds.
+/// The most descriptors of a set, of any mix of kinds.
 pub(crate) const MAX_PER_SET_DESCRIPTORS: u32 = DESCRIPTORS;
 
-/// The most descriptors of a kind that a stage, or a set, may have. Nothing but memory bounds them.
+/// The most descriptors of a kind in a stage, or in a set. Only memory bounds them.
 const DESCRIPTORS: u32 = 1 << 20;
 
 /// The most bytes of an inline uniform block.
 pub(crate) const MAX_INLINE_UNIFORM_BLOCK_SIZE: u32 = 4096;
 
-/// The most inline uniform blocks of a stage, or of a set. Nothing but memory bounds them.
+/// The most inline uniform blocks of a stage, or of a set. Only memory bounds them.
 const INLINE_UNIFORM_BLOCKS: u32 = 64;
 
 /// The most descriptors with dynamic offsets.
 const DYNAMIC_DESCRIPTORS: u32 = 64;
 
-/// Offsets of uniform, storage and texel buffers must be multiples of this.
+/// The alignment of offsets of uniform, storage and texel buffers.
 pub(crate) const MIN_BUFFER_OFFSET_ALIGNMENT: u64 = 16;
 
 /// The most texels of a texel buffer.
 pub(crate) const MAX_TEXEL_BUFFER_ELEMENTS: u32 = 1 << 27;
 
-/// The most scalars that a vertex shader hands to a fragment shader: 32 vectors of four.
+/// The most scalars that a vertex shader passes to a fragment shader: 32 vectors of four.
 const MAX_VARYING_COMPONENTS: u32 = 128;
 
-/// The offsets in texels that an instruction may give.
+/// The offsets in texels that an instruction may have.
 const TEXEL_OFFSETS: std::ops::RangeInclusive<i32> = -32..=31;
 
-/// The most workgroups of a dispatch in x, y and z. The device takes any number; programs that read the limit as signed take
-/// a greater one for -1.
+/// The most workgroups of a dispatch in x, y and z. The device supports any number, but some applications read the
+/// limit as signed, so that a greater one would be -1 to them.
 const MAX_WORKGROUP_COUNT: u32 = 65535;
 
 /// The most invocations of a workgroup in x, y and z.
@@ -112,7 +112,7 @@ pub(crate) const MAX_SHARED_BYTES: u32 = simdevice::limits::MAX_SHARED_BYTES;
 /// Invocations of a subgroup, unless a pipeline requires another size.
 pub(crate) const SUBGROUP_SIZE: u32 = simdevice::limits::DRAW_SUBGROUP_SIZE;
 
-/// The least and the greatest size that a pipeline may require.
+/// The subgroup sizes that a pipeline may require.
 pub(crate) const SUBGROUP_SIZES: std::ops::RangeInclusive<u32> = 4..=128;
 
 /// The most vertex attributes and vertex bindings. Gaussians of degree 3 take 20 attributes.
@@ -127,7 +127,7 @@ fn driver_version() -> [u8; 3] {
     ]
 }
 
-/// A UUID that tells what it identifies, and changes with the driver's version if it holds the version.
+/// A UUID of 13 bytes of name and three of version.
 fn uuid(name: &[u8; 13], version: [u8; 3]) -> [u8; vk::UUID_SIZE] {
     let mut uuid = [0; vk::UUID_SIZE];
     uuid[..13].copy_from_slice(name);
@@ -229,7 +229,7 @@ fn find_properties() -> Properties {
         min_texel_gather_offset: *TEXEL_OFFSETS.start(),
         max_texel_gather_offset: *TEXEL_OFFSETS.end() as u32,
         min_interpolation_offset: -0.5,
-        // The greatest offset is less than half a pixel by one step of its precision.
+        // The greatest offset is half a pixel less one step of its precision.
         max_interpolation_offset: 0.5 - 1.0 / 16.0,
         sub_pixel_interpolation_offset_bits: 4,
         max_framebuffer_width: MAX_IMAGE_DIMENSION,
@@ -314,7 +314,7 @@ fn find_properties() -> Properties {
         shader_rounding_mode_rtz_float16: false,
         shader_rounding_mode_rtz_float32: false,
         shader_rounding_mode_rtz_float64: false,
-        // Sets are read when commands execute, so that it makes no difference when they were updated.
+        // Sets are read when commands execute, so the time of an update makes no difference.
         max_update_after_bind_descriptors_in_all_pools: u32::MAX,
         shader_uniform_buffer_array_non_uniform_indexing_native: true,
         shader_sampled_image_array_non_uniform_indexing_native: true,
@@ -354,7 +354,7 @@ fn find_properties() -> Properties {
         max_multi_draw_count: 1 << 16,
         line_sub_pixel_precision_bits: 8,
         dynamic_primitive_topology_unrestricted: false,
-        // Every access is held against the range itself, scalar by scalar.
+        // Every access is checked against the range itself, scalar by scalar.
         robust_storage_buffer_access_size_alignment: 1,
         robust_uniform_buffer_access_size_alignment: 1,
         framebuffer_integer_color_sample_counts: SAMPLE_COUNTS,
@@ -368,7 +368,7 @@ fn find_properties() -> Properties {
         max_descriptor_set_inline_uniform_blocks: INLINE_UNIFORM_BLOCKS,
         max_descriptor_set_update_after_bind_inline_uniform_blocks: INLINE_UNIFORM_BLOCKS,
         max_inline_uniform_total_size: MAX_INLINE_UNIFORM_BLOCK_SIZE * INLINE_UNIFORM_BLOCKS,
-        // No instruction is a dot product of integers.
+        // No instruction computes a dot product of integers.
         integer_dot_product8_bit_unsigned_accelerated: false,
         integer_dot_product8_bit_signed_accelerated: false,
         integer_dot_product8_bit_mixed_signedness_accelerated: false,
@@ -421,7 +421,7 @@ fn find_properties() -> Properties {
     }
 }
 
-/// A string as Vulkan's structures hold it, cut off where it doesn't fit.
+/// A string in a fixed array of a Vulkan structure, truncated if necessary.
 fn fixed_string<const N: usize>(text: &CStr) -> [c_char; N] {
     let mut array = [0; N];
     convert::write_string(&mut array, text);

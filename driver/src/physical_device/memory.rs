@@ -1,20 +1,20 @@
 //! Memory heaps and types, and the accounting of a device's heap.
 //!
-//! There is one heap, of the host's memory, with two types: one that only the device sees, from whose contents the
-//! device may derive and keep what it likes, and one that the host may map.
+//! There is one heap, in the host's memory, with two types. Memory of one is accessed only by the device, which may
+//! cache data derived from its contents; memory of the other may be mapped by the host.
 
 use crate::abi::error::Error;
 use ash::vk;
 use std::sync::LazyLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Every allocation begins at a multiple of this many bytes, in the device's and in the host's view.
+/// The alignment of every allocation in bytes, in the device's and in the host's addresses.
 pub(crate) const ALIGNMENT: u64 = 4096;
 
-/// The size of the heap where the host's memory can't be found out.
+/// The size of the heap if the host's memory is unknown.
 const FALLBACK_HEAP_SIZE: u64 = 2 << 30;
 
-/// The types, in the order of their indices: Vulkan wants a type before those with more properties.
+/// The types, in the order of their indices: Vulkan requires a type to precede those with more properties.
 const TYPES: [vk::MemoryPropertyFlags; 2] = [
     vk::MemoryPropertyFlags::DEVICE_LOCAL,
     vk::MemoryPropertyFlags::from_raw(
@@ -25,15 +25,15 @@ const TYPES: [vk::MemoryPropertyFlags; 2] = [
     ),
 ];
 
-/// The `memoryTypeBits` of a resource that any type will do for.
+/// The `memoryTypeBits` of a resource that may use any type.
 pub(crate) const ALL_TYPE_BITS: u32 = (1 << TYPES.len()) - 1;
 
-/// The properties of a memory type, or `None` if there is none of that index.
+/// The properties of a memory type; `None` if there is no such index.
 pub(crate) fn type_properties(index: u32) -> Option<vk::MemoryPropertyFlags> {
     TYPES.get(index as usize).copied()
 }
 
-/// Bytes of the heap: three quarters of the host's memory.
+/// The size of the heap in bytes: three quarters of the host's memory.
 pub(crate) fn heap_size() -> u64 {
     static SIZE: LazyLock<u64> =
         LazyLock::new(|| host_memory().map_or(FALLBACK_HEAP_SIZE, |bytes| bytes / 4 * 3));
@@ -77,10 +77,10 @@ pub(crate) fn properties() -> vk::PhysicalDeviceMemoryProperties {
     properties
 }
 
-/// The bytes that all devices of the process have taken.
+/// The bytes that all devices of the process have allocated.
 static TAKEN: AtomicU64 = AtomicU64::new(0);
 
-/// The bytes of each heap that the process may have, and those that it has.
+/// Writes the budget of each heap for the process, and its usage, in bytes.
 pub(crate) fn write_budget(out: &mut vk::PhysicalDeviceMemoryBudgetPropertiesEXT<'_>) {
     out.heap_budget = [0; vk::MAX_MEMORY_HEAPS];
     out.heap_usage = [0; vk::MAX_MEMORY_HEAPS];
@@ -88,7 +88,7 @@ pub(crate) fn write_budget(out: &mut vk::PhysicalDeviceMemoryBudgetPropertiesEXT
     let free = std::fs::read_to_string("/proc/meminfo")
         .ok()
         .and_then(|text| kibibytes(&text, "MemAvailable:"));
-    // What other processes use isn't to be had.
+    // Memory that other processes use is not available.
     let available = free.map_or(u64::MAX, |free| free.saturating_add(out.heap_usage[0]));
     out.heap_budget[0] = available.min(heap_size());
 }
@@ -109,7 +109,7 @@ impl Heap {
         }
     }
 
-    /// Takes `size` bytes, or none.
+    /// Allocates `size` bytes of the heap, or none.
     ///
     /// # Errors
     /// [`Error::OutOfDeviceMemory`].
@@ -128,7 +128,7 @@ impl Heap {
             })
     }
 
-    /// Gives back what was taken.
+    /// Frees bytes of the heap.
     pub(crate) fn give_back(&self, size: u64) {
         self.used.fetch_sub(size, Ordering::AcqRel);
         TAKEN.fetch_sub(size, Ordering::AcqRel);

@@ -1,4 +1,4 @@
-//! The physical device's answers: properties, features, formats, memory, queues and counters, each stated once.
+//! The physical device's properties, features, formats, memory, queues and counters, each defined once.
 
 pub(crate) mod counters;
 pub(crate) mod environment;
@@ -14,10 +14,10 @@ use crate::registry::{self, features::SUPPORTED};
 use ash::vk;
 use std::ffi::CStr;
 
-/// The index of the queue family that does everything.
+/// The index of the queue family that supports everything.
 pub(crate) const QUEUE_FAMILY: u32 = 0;
 
-/// What the queues of each family do: everything, all but draws, and copies.
+/// The capabilities of the queues of each family: everything, all except draws, and copies.
 pub(crate) const QUEUE_FAMILIES: [vk::QueueFlags; 3] = [
     vk::QueueFlags::from_raw(
         vk::QueueFlags::GRAPHICS.as_raw()
@@ -28,7 +28,7 @@ pub(crate) const QUEUE_FAMILIES: [vk::QueueFlags; 3] = [
     vk::QueueFlags::TRANSFER,
 ];
 
-/// The number of queues that each family has.
+/// The number of queues of each family.
 pub(crate) const QUEUE_COUNT: u32 = 1;
 
 /// `VkQueueFamilyProperties` of a family. Timestamps are the host's nanoseconds in 64 bits.
@@ -45,8 +45,8 @@ fn queue_family_properties(queue_flags: vk::QueueFlags) -> vk::QueueFamilyProper
     }
 }
 
-/// Answers whether there can be such an image. That there can't is an answer and no failure: applications ask to
-/// find out.
+/// Answers whether such an image is supported. That it isn't is an answer and not reported as a failure, because
+/// applications ask to find out.
 fn image_format_answer(
     query: ImageQuery,
     out: &mut vk::ImageFormatProperties,
@@ -297,7 +297,7 @@ pub(crate) unsafe fn enumerate_performance_query_counters(
     }
 }
 
-/// Every counter is always on.
+/// Returns one pass: every counter is always on.
 #[doc(alias = "vkGetPhysicalDeviceQueueFamilyPerformanceQueryPassesKHR")]
 pub(crate) fn get_performance_query_passes() -> Result<u32, Error> {
     Ok(1)

@@ -1,4 +1,4 @@
-//! Bound descriptor sets as the resources that programs are bound to, by their slots; and dispatches.
+//! Conversion of bound descriptor sets to the resources of programs, by their slots; and dispatches.
 
 use super::state::{BoundSets, State};
 use crate::command::BoundSet;
@@ -18,7 +18,7 @@ use std::sync::Arc;
 #[error("descriptor set {0}, which the pipeline uses, is not bound")]
 pub(crate) struct DescriptorSetNotBound(pub(super) u32);
 
-/// The resources as a program that uses `resources` is bound to them. What a set doesn't hold reads as zero.
+/// The resources to bind to a program that uses `resources`. Descriptors that a set doesn't have read as zero.
 ///
 /// # Errors
 /// [`DescriptorSetNotBound`] if a set is missing.
@@ -48,10 +48,10 @@ pub(crate) fn bindings(
     Ok(bindings)
 }
 
-/// Binds what one variable of a program uses.
+/// Binds the descriptors of one variable of a program.
 fn bind(used: &ShaderBinding, bound: &BoundSet, binding: &LayoutBinding, bindings: &mut Bindings) {
     let held = bound.set.lock();
-    // A set may have fewer descriptors of its last binding than the layout says.
+    // A set may have fewer descriptors of its last binding than the layout.
     let held = held.get(binding.first..).unwrap_or_default();
     let count = (used.count.min(binding.count) as usize).min(held.len());
     for (element, descriptor) in held[..count].iter().enumerate() {
@@ -62,7 +62,7 @@ fn bind(used: &ShaderBinding, bound: &BoundSet, binding: &LayoutBinding, binding
     }
 }
 
-/// Puts what a descriptor holds in a resource slot.
+/// Binds a descriptor to a resource slot.
 fn place(
     used: &ShaderBinding,
     slot: usize,
@@ -96,7 +96,7 @@ fn place(
     }
 }
 
-/// An image's view as a variable of this kind reads it.
+/// An image view as a variable of this kind reads it.
 fn image(kind: DescriptorKind, view: &ImageView) -> ImageBinding {
     let (aspect, swizzle) = (view.aspect, view.swizzle);
     let view = view.view.clone();
@@ -123,7 +123,7 @@ fn keep_written(memory: &Arc<Allocation>, bindings: &mut Bindings) {
     }
 }
 
-/// The element in a resource slot, of a list that grows as needed.
+/// The element of a resource slot in a list, which grows as needed.
 fn element<T: Default>(slots: &mut Vec<T>, index: usize) -> &mut T {
     if slots.len() <= index {
         host::reserve(slots, index + 1 - slots.len());
@@ -135,10 +135,10 @@ fn element<T: Default>(slots: &mut Vec<T>, index: usize) -> &mut T {
 /// The reason that a dispatch does nothing: state that it needs is undefined.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum DispatchError {
-    /// No pipeline.
+    /// No pipeline is bound.
     #[error("no compute pipeline is bound")]
     Pipeline,
-    /// Something that the pipeline reads is not bound.
+    /// A descriptor set that the pipeline reads is not bound.
     #[error(transparent)]
     DescriptorSetNotBound(#[from] DescriptorSetNotBound),
 }

@@ -1,5 +1,5 @@
-//! Draws of points, lines and triangles as packets, and what draws of every kind have in common: bound buffers, indirect
-//! parameters, and state that is missing.
+//! Conversion of draws of points, lines and triangles to packets, and parts that draws of every kind share: bound
+//! buffers, indirect parameters, and missing state.
 
 use super::descriptors::{self, DescriptorSetNotBound};
 use super::state::State;
@@ -19,13 +19,13 @@ use std::sync::Arc;
 /// The reason that a draw draws nothing: state that it needs is undefined.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum DrawError {
-    /// No pipeline.
+    /// No pipeline is bound.
     #[error("no graphics pipeline is bound")]
     Pipeline,
-    /// No camera.
+    /// No camera is set.
     #[error("no camera is set: vkCmdSetGaussianCamerasGAURAST must be recorded before the draw")]
     Camera,
-    /// No camera of a view.
+    /// A view has no camera.
     #[error(
         "there are {cameras} cameras, and view {view} would have number {view}: there must be one for all views, or more \
          than the greatest view index (VUID-vkCmdDraw-cameraCount-90063)"
@@ -33,21 +33,21 @@ pub(crate) enum DrawError {
     CameraOfView {
         /// The view index.
         view: u32,
-        /// Cameras.
+        /// The number of cameras.
         cameras: usize,
     },
-    /// A camera of a model that is not enabled.
+    /// The camera's model is not enabled.
     #[error(
         "the camera's model is {0:?}, and its feature is not enabled (VUID-VkGaussianCameraGAURAST-model-parameter)"
     )]
     CameraModel(CameraModel),
-    /// A camera of a model that Gaussians of the pipeline's modes cannot be seen by.
+    /// The camera's model doesn't support the pipeline's modes.
     #[error(
         "the pipeline's geometry and precision do not go with a camera whose model is {0:?} \
          (VUID-vkCmdDraw-geometry-90071)"
     )]
     ModeOfCameraModel(CameraModel),
-    /// No uniform buffer where the camera should be.
+    /// No uniform buffer is bound for the camera.
     #[error(
         "no uniform buffer is bound at set {set}, binding {binding}, where the camera should be"
     )]
@@ -57,59 +57,59 @@ pub(crate) enum DrawError {
         /// The binding.
         binding: u32,
     },
-    /// A uniform buffer that holds no camera.
+    /// The uniform buffer holds no valid camera.
     #[error("the camera's uniform buffer: {0}")]
     CameraData(String),
-    /// Another pipeline than that of the set's first draw.
+    /// The pipeline is not that of the set's first draw.
     #[error(
         "its pipeline is not that of the first draw of the set that vkCmdBeginGaussianSetGAURAST has begun \
          (VUID-vkCmdDraw-None-90005)"
     )]
     OtherPipelineInSet,
-    /// Other state than that of the set's first draw.
+    /// Other state is not that of the set's first draw.
     #[error(
         "cameras, viewport, scissor or dynamic state are not those of the first draw of the set that \
          vkCmdBeginGaussianSetGAURAST has begun (VUID-vkCmdDraw-None-90006)"
     )]
     OtherStateInSet,
-    /// No viewport.
+    /// No viewport is set.
     #[error("the pipeline's viewport is dynamic and none is set")]
     Viewport,
-    /// No scissor.
+    /// No scissor is set.
     #[error("the pipeline's scissor is dynamic and none is set")]
     Scissor,
-    /// Not as many scissors as viewports.
+    /// The numbers of viewports and scissors differ.
     #[error("{viewports} viewports and {scissors} scissors are set")]
     ScissorCount {
-        /// Viewports.
+        /// The number of viewports.
         viewports: usize,
-        /// Scissors.
+        /// The number of scissors.
         scissors: usize,
     },
-    /// Dynamic state that is not set.
+    /// A dynamic state is not set.
     #[error("the pipeline's {0:?} is dynamic and was not set")]
     Dynamic(vk::DynamicState),
-    /// Dynamic state whose values a pipeline could not have.
+    /// A dynamic state has a value that a pipeline could not have.
     #[error(
         "a dynamic state was set to what the pipeline may not have: {0} (VUID-vkCmdDraw-dynamic-90060)"
     )]
     DynamicValue(String),
-    /// No buffer of spherical harmonics.
+    /// No buffer of spherical harmonics is bound.
     #[error(
         "no buffer of spherical harmonics is bound, which the pipeline's flags ask for \
          (VUID-vkCmdDraw-sphericalHarmonicsBuffer-90018)"
     )]
     Harmonics,
-    /// Vertex input that the vertex program cannot read.
+    /// The vertex input doesn't fit the vertex program.
     #[error("vertex input: {0}")]
     VertexInput(String),
-    /// No vertex buffer.
+    /// A vertex buffer is not bound.
     #[error("no vertex buffer is bound at binding {0}")]
     VertexBuffer(u32),
-    /// No index buffer.
+    /// No index buffer is bound.
     #[error("no index buffer is bound")]
     IndexBuffer,
-    /// Something that the pipeline reads is not bound.
+    /// A descriptor set that the pipeline reads is not bound.
     #[error(transparent)]
     DescriptorSetNotBound(#[from] DescriptorSetNotBound),
 }
@@ -136,10 +136,9 @@ pub(super) fn attribute_stream(
     })
 }
 
-/// The sources of attributes that the command buffer has set.
+/// The sources of attributes, from the command buffer's dynamic vertex input.
 ///
-/// # Errors
-/// [`DrawError::Dynamic`] if it has set none, [`DrawError::VertexInput`] for those that are not as the program reads them.
+/// # Errors [`DrawError::Dynamic`] if none is set, [`DrawError::VertexInput`] for sources that don't fit the program.
 fn dynamic_sources(
     state: &State,
     locations: &[(u32, ScalarType)],
@@ -206,7 +205,7 @@ pub(super) fn primitives(
     })))
 }
 
-/// The fixed-function state, which is made anew only when something of it has changed since the last draw.
+/// The fixed-function state. It is computed again only if something in it has changed since the last draw.
 fn draw_state(
     state: &mut State,
     primitives: &PrimitivePipeline,
@@ -248,7 +247,7 @@ fn dynamic_count(origin: ViewportSource, set: Option<u32>) -> Option<u32> {
     }
 }
 
-/// The first `count` of what is set, if there are any and all are there.
+/// The first `count` values; None if there are none or one of them is not set.
 fn set<T: Copy>(slots: &[Option<T>], count: u32) -> Option<Vec<T>> {
     slots
         .get(..count as usize)
@@ -258,7 +257,7 @@ fn set<T: Copy>(slots: &[Option<T>], count: u32) -> Option<Vec<T>> {
         .collect()
 }
 
-/// Reads how many draws there are.
+/// Reads the number of draws.
 pub(super) fn read_count(range: &BufferRange) -> Option<u32> {
     let mut count = [0];
     range.memory.read(range.offset, &mut count).ok()?;

@@ -1,4 +1,4 @@
-//! Gaussian draws as the packets of a sorted set.
+//! Conversion of Gaussian draws to the packets of a sorted set.
 
 use super::descriptors::{self, DescriptorSetNotBound};
 use super::draw::{DrawError, attribute_stream, indices};
@@ -26,7 +26,7 @@ use std::sync::Arc;
 pub(crate) struct Begin {
     /// The state of the set.
     pub(crate) set: GaussianBegin,
-    /// The program that makes colours, if there is one.
+    /// The fragment program that computes colours, if there is one.
     resolve: Option<GaussianFragmentStage>,
 }
 
@@ -98,7 +98,7 @@ pub(crate) fn append(
     })))
 }
 
-/// The packet that adds a draw whose Gaussians a vertex shader projects.
+/// The packet that adds a draw whose Gaussians are projected by a vertex shader.
 fn shaded(
     state: &State,
     pipeline: &GraphicsPipeline,
@@ -137,8 +137,8 @@ fn shaded(
     )))
 }
 
-/// The cameras that the views of a draw are seen with, in the order of views, if their models' features are enabled: one for
-/// all of them, or one for each.
+/// The cameras of a draw's views, in the order of views, after a check that their models' features are enabled: one for
+/// all views, or one for each.
 fn enabled_cameras(state: &State, gaussian: &GaussianPipeline) -> Result<Vec<Camera>, DrawError> {
     let source = Cameras::new(state, gaussian.camera)?;
     let views = (0..u32::BITS).filter(|view| gaussian.view_mask >> view & 1 == 1);
@@ -155,7 +155,7 @@ fn enabled_cameras(state: &State, gaussian: &GaussianPipeline) -> Result<Vec<Cam
     Ok(cameras)
 }
 
-/// Refuses a camera whose model is not enabled, or does not see Gaussians of the pipeline's modes.
+/// Refuses a camera whose model is not enabled, or doesn't support the pipeline's modes.
 fn check_camera(camera: &Camera, gaussian: &GaussianPipeline) -> Result<(), DrawError> {
     if !gaussian.camera_models.have(camera.model) {
         return Err(DrawError::CameraModel(camera.model));
@@ -177,11 +177,11 @@ fn check_camera(camera: &Camera, gaussian: &GaussianPipeline) -> Result<(), Draw
 
 /// The cameras that a draw is given.
 enum Cameras<'a> {
-    /// One that means nothing.
+    /// A camera that is not used.
     None,
     /// Cameras that a command has set.
     Set(&'a [Camera]),
-    /// Cameras of a uniform buffer.
+    /// Cameras in a uniform buffer.
     Buffer { range: BufferRange, count: usize },
 }
 
@@ -217,7 +217,7 @@ impl<'a> Cameras<'a> {
         }
     }
 
-    /// The camera of a view, of `cameras` that there are.
+    /// The camera of a view, given the number of cameras.
     fn get(&self, view: u32, cameras: usize) -> Result<Camera, DrawError> {
         let none = DrawError::CameraOfView { view, cameras };
         let number = view as usize;
@@ -231,7 +231,7 @@ impl<'a> Cameras<'a> {
     }
 }
 
-/// The state of the pipeline, with the dynamic part filled in.
+/// The state of the pipeline, with its dynamic parts filled in.
 fn fixed_state(
     state: &State,
     gaussian: &GaussianPipeline,
@@ -252,8 +252,8 @@ fn fixed_state(
     Ok(Arc::new(set))
 }
 
-/// A Gaussian's pixels count from the upper left corner of the area that the viewport covers, so a negative
-/// height changes nothing but where that corner is.
+/// The viewport with a positive height. A Gaussian's pixels are relative to the upper left corner of the viewport's
+/// area, so a negative height changes only the position of that corner.
 fn upright(viewport: Viewport) -> Viewport {
     if viewport.height >= 0.0 {
         return viewport;
@@ -269,7 +269,7 @@ fn upright(viewport: Viewport) -> Viewport {
 fn coefficient(buffer: &HarmonicsBuffer, number: u64) -> AttributeStream {
     let range = &buffer.range;
     let start = number.saturating_mul(buffer.coefficient_stride);
-    // Streams of one place are read together.
+    // Streams that begin at the same place are read together.
     let (moved, offset) = match u32::try_from(start) {
         Ok(offset) => (0, offset),
         Err(_) => (start.min(range.size), 0),

@@ -1,4 +1,4 @@
-//! Replay of recorded commands: the one match from a recording to the packets that the device executes.
+//! Replay of recorded commands: one match converts a recording to the packets that the device executes.
 
 mod descriptors;
 mod draw;
@@ -21,9 +21,9 @@ use std::sync::Arc;
 pub(super) struct Execution<'a> {
     /// The queue's command processor.
     pub(super) processor: &'a mut CommandProcessor,
-    /// The things that are waited for on the device, and its loss.
+    /// The state that can be waited for on the device, and its loss.
     pub(super) sync: &'a DeviceSync,
-    /// The instance that hears of what the application should not have recorded.
+    /// The instance, to which errors in the recording are reported.
     pub(super) instance: &'a Instance,
 }
 
@@ -41,10 +41,10 @@ impl Execution<'_> {
         }
     }
 
-    /// Executes a packet; everything before it has been executed.
+    /// Executes a packet, after everything before it has been executed.
     fn execute(&mut self, packet: &Packet) -> Result<(), Error> {
         match self.processor.execute(packet) {
-            // The draw draws nothing, and what follows is as if it weren't there.
+            // The draw draws nothing, and execution continues after it.
             Err(error @ ExecutionError::TooManyGaussians(_)) => {
                 self.report(&format!("a draw draws nothing: {error}"));
                 Ok(())
@@ -53,7 +53,7 @@ impl Execution<'_> {
         }
     }
 
-    /// Tells the application of something that it should not have recorded.
+    /// Reports an error in the recording to the application.
     fn report(&self, message: &str) {
         log::warn!("{message}");
         self.instance.report(
@@ -68,7 +68,7 @@ impl Execution<'_> {
 /// Replays a command buffer.
 ///
 /// # Errors
-/// [`Error::DeviceLost`] if the device is lost while it executes; what follows in the command buffer is then not executed.
+/// [`Error::DeviceLost`] if the device is lost during execution; the rest of the command buffer is then not executed.
 pub(super) fn replay(commands: &[Command], execution: &mut Execution<'_>) -> Result<(), Error> {
     let mut state = State::default();
     commands
@@ -122,7 +122,7 @@ fn execute(
         Command::BeginGaussianSet => state.gaussian_set = Some(SharedSet::default()),
         Command::EndGaussianSet => {
             let set = state.gaussian_set.take();
-            // Nothing was begun where nothing was drawn.
+            // A set without draws was never begun on the device.
             if set.is_some_and(|set| set.first.is_some()) {
                 execution.execute(&Packet::GaussianEnd)?;
             }
@@ -159,7 +159,7 @@ fn execute(
             }
         }
         Command::CopyQueryResults(copy) => {
-            // Everything before has been executed, so a query that isn't available now never will be by this queue.
+            // Everything before has been executed, so this queue will not make another query available.
             for packet in query::copy_packets(copy) {
                 execution.execute(&packet)?;
             }

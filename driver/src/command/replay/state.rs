@@ -1,4 +1,4 @@
-//! The state that a command buffer's draws read, as the commands replayed so far have left it.
+//! The state that draws of a command buffer read, as set by the commands replayed so far.
 
 use crate::abi::error::Error;
 use crate::command::{BindPoint, BoundSet, HarmonicsBuffer, IndexBuffer, VertexBuffer};
@@ -14,7 +14,7 @@ use simdevice::state::gaussian::Camera;
 use simdevice::state::{DrawState, Rect, Viewport};
 use std::sync::Arc;
 
-/// Bound state. All of it is undefined when a command buffer begins; here "undefined" is `None`.
+/// Bound state. All of it is undefined, which is `None`, when a command buffer begins.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct State {
     /// The graphics pipeline.
@@ -25,11 +25,11 @@ pub(crate) struct State {
     pub(crate) graphics_sets: BoundSets,
     /// The descriptor sets of dispatches.
     pub(crate) compute_sets: BoundSets,
-    /// Push constants, as far as any were pushed.
+    /// Push constants, up to the last byte that was pushed.
     pub(crate) push_constants: Vec<u8>,
     /// The vertex buffers by binding.
     pub(crate) vertex_buffers: Vec<Option<VertexBuffer>>,
-    /// Vertex bindings and attributes, where they are dynamic.
+    /// Vertex bindings and attributes, if they are dynamic.
     pub(crate) vertex_input: Option<Arc<VertexInput>>,
     /// The index buffer.
     pub(crate) index_buffer: Option<IndexBuffer>,
@@ -37,20 +37,20 @@ pub(crate) struct State {
     pub(crate) viewports: Vec<Option<Viewport>>,
     /// Dynamic scissors.
     pub(crate) scissors: Vec<Option<Rect>>,
-    /// The number of viewports, where they were set with their count.
+    /// The number of viewports, if they were set with their count.
     pub(crate) viewport_count: Option<u32>,
-    /// The number of scissors, where they were set with their count.
+    /// The number of scissors, if they were set with their count.
     pub(crate) scissor_count: Option<u32>,
     /// All other dynamic state.
     pub(crate) dynamic_states: DynamicStates,
-    /// The fixed-function state that the last draw made of all this, unless something has changed since.
+    /// The fixed-function state of the last draw, unless something in it has changed since.
     pub(crate) draw_state: Option<Arc<DrawState>>,
-    /// The cameras of Gaussian draws, one for all views or one for each, if they were set; kept when another pipeline is
-    /// bound.
+    /// The cameras of Gaussian draws, one for all views or one for each, if they were set. Binding another pipeline
+    /// keeps them.
     pub(crate) cameras: Box<[Camera]>,
     /// The buffer of spherical harmonics.
     pub(crate) harmonics: Option<HarmonicsBuffer>,
-    /// The sorted set that draws share, if one was begun.
+    /// The sorted set that draws share, if one has begun.
     pub(crate) gaussian_set: Option<SharedSet>,
 }
 
@@ -93,7 +93,7 @@ impl State {
         self.push_constants[range].copy_from_slice(bytes);
     }
 
-    /// Sets vertex bindings and attributes; the strides are theirs now.
+    /// Sets vertex bindings and attributes, whose strides replace those set before.
     pub(crate) fn set_vertex_input(&mut self, input: &Arc<VertexInput>) {
         self.vertex_input = Some(Arc::clone(input));
         for bound in self.vertex_buffers.iter_mut().flatten() {
@@ -129,7 +129,7 @@ impl BoundSets {
         bind(&mut self.0, first, sets);
     }
 
-    /// Changes descriptors of the pushed set `number`. What was pushed before stays, if it had the same layout.
+    /// Updates descriptors of the pushed set `number`. Descriptors pushed before stay, if the layout is the same.
     ///
     /// # Errors
     /// [`Error::InvalidUsage`] if the layout does not have what is written.

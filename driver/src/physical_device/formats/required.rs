@@ -1,9 +1,9 @@
-//! The tables "Required Format Support" of Vulkan 1.0, and what an implementation chooses among them.
+//! Tests of the tables "Required Format Support" of Vulkan 1.0, and of the choices that they leave.
 
 use super::properties;
 use ash::vk::{Format as F, FormatFeatureFlags as Feature};
 
-/// The features that letters stand for in the image column.
+/// The features that letters mean in the image column.
 const IMAGE: &[(char, Feature)] = &[
     ('s', Feature::SAMPLED_IMAGE),
     ('b', Feature::BLIT_SRC),
@@ -16,7 +16,7 @@ const IMAGE: &[(char, Feature)] = &[
     ('z', Feature::DEPTH_STENCIL_ATTACHMENT),
 ];
 
-/// The features that letters stand for in the buffer column.
+/// The features that letters mean in the buffer column.
 const BUFFER: &[(char, Feature)] = &[
     ('v', Feature::VERTEX_BUFFER),
     ('u', Feature::UNIFORM_TEXEL_BUFFER),
@@ -24,7 +24,7 @@ const BUFFER: &[(char, Feature)] = &[
     ('a', Feature::STORAGE_TEXEL_BUFFER_ATOMIC),
 ];
 
-/// Formats with what images of optimal tiling, and buffers, must be able to do.
+/// Formats, with the required features of images of optimal tiling, and of buffers.
 const REQUIRED: &[(F, &str, &str)] = &[
     (F::B4G4R4A4_UNORM_PACK16, "sbl", ""),
     (F::R5G6B5_UNORM_PACK16, "sblcdm", ""),
@@ -98,7 +98,7 @@ fn every_format_can_do_what_vulkan_requires() {
         let transfer = Feature::TRANSFER_SRC | Feature::TRANSFER_DST;
         let mut required = features(image, IMAGE);
         if !required.is_empty() {
-            // Since Vulkan 1.1 these are said, where 1.0 meant them of any image.
+            // Since Vulkan 1.1 these features are explicit; 1.0 implied them for any image.
             required |= transfer;
         }
         let lacking = required & !found.optimal_tiling_features;
@@ -108,7 +108,7 @@ fn every_format_can_do_what_vulkan_requires() {
     }
 }
 
-/// One of the families of compressed formats is required, whole: this is it.
+/// Tests the family of compressed formats that the driver supports as a whole; Vulkan requires one of the families.
 #[test]
 fn blocks_are_sampled_filtered_and_blitted() {
     let required = features("sbl", IMAGE) | Feature::TRANSFER_SRC | Feature::TRANSFER_DST;

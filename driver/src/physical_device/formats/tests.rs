@@ -3,7 +3,7 @@ use std::collections::HashSet;
 
 #[test]
 fn every_format_of_the_device_has_a_vulkan_name() {
-    // The core's first block, and the two formats of four bits that came later.
+    // The first block of core formats, and the two formats of four bits that were added later.
     let later = [
         vk::Format::A4R4G4B4_UNORM_PACK16,
         vk::Format::A4B4G4R4_UNORM_PACK16,
