@@ -14,26 +14,27 @@ use std::mem::MaybeUninit;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// The period in which a wait for a query looks whether the device was lost.
+/// The period in which a wait for a query checks whether the device was lost.
 const POLL: Duration = Duration::from_millis(20);
 
 /// A query pool.
 #[derive(Debug)]
 pub(crate) struct QueryPool {
-    /// The device's half.
+    /// The device's query pool.
     pub(crate) queries: Arc<query::QueryPool>,
-    /// The values that results hold.
+    /// The kind of values in results.
     query_type: QueryType,
 }
 
-/// The values that the results of a pool's queries hold.
+/// The kind of values in the results of a pool's queries.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum QueryType {
     /// The host's time, or the simulated hardware's.
     Timestamp,
     /// Counters as `VkPerformanceCounterResultKHR`s, in order.
     Performance(Vec<u32>),
-    /// Counters as words, in order: occlusion and pipeline statistics. `None` counts what this device never does.
+    /// Counters as words, in order: occlusion and pipeline statistics. `None` is a statistic that is always zero on
+    /// this device.
     Words(Vec<Option<Counter>>),
 }
 
@@ -93,7 +94,7 @@ impl QueryType {
         }
     }
 
-    /// The number of values that a result has.
+    /// The number of values in a result.
     fn count(&self) -> usize {
         match self {
             Self::Timestamp => 1,
@@ -103,7 +104,7 @@ impl QueryType {
     }
 }
 
-/// Tells if a model of the hardware must run for a counter.
+/// Reports whether a counter needs a model of the hardware.
 fn is_simulated(index: &u32) -> bool {
     let counter = Counter::ALL.get(*index as usize);
     counter.is_some_and(|counter| counter.is_simulated())
@@ -120,19 +121,19 @@ impl QueryPool {
         }
     }
 
-    /// Tells if it has queries `first..first + count`.
+    /// Reports whether it has queries `first..first + count`.
     pub(crate) fn has(&self, first: u32, count: u32) -> bool {
         u64::from(first) + u64::from(count) <= u64::from(self.queries.count())
     }
 
-    /// The bytes that Vulkan writes for a query: its values, as words of 32 or 64 bits, if it is available, and its availability
-    /// after them, if that is asked for. Each is an offset from the query's place and the bytes there.
+    /// The bytes that Vulkan writes for a query: its values, as words of 32 or 64 bits, if it is available; then its
+    /// availability, if the flags ask for it. Each is an offset from the query's place, and bytes.
     pub(crate) fn written(
         &self,
         result: Option<&QueryResult>,
         flags: QueryResultFlags,
     ) -> Vec<(u64, Vec<u8>)> {
-        // A VkPerformanceCounterResultKHR has eight bytes whatever the flags.
+        // A VkPerformanceCounterResultKHR has eight bytes, whatever the flags say.
         let wide = flags.contains(QueryResultFlags::TYPE_64)
             || matches!(self.query_type, QueryType::Performance(_));
         let word = |value: u64| {
@@ -145,7 +146,7 @@ impl QueryPool {
         let mut written = Vec::new();
         let values = match result {
             Some(result) => Some(self.values(result)),
-            // So far nothing was counted: what is between is only known when the query ends.
+            // The partial result is zero: counters are only known when the query ends.
             None if flags.contains(QueryResultFlags::PARTIAL) => {
                 Some(vec![0; self.query_type.count()])
             }
@@ -183,7 +184,7 @@ impl QueryPool {
     }
 }
 
-/// A query's result, after a wait where that is asked for.
+/// A query's result, after a wait if the flags ask for it.
 fn result(
     pool: &QueryPool,
     index: u32,
@@ -222,7 +223,7 @@ pub(crate) fn require_queries(
     ))
 }
 
-/// The pool that a create info asks for.
+/// The pool of a create info.
 ///
 /// # Safety
 /// The create info's chain is valid.

@@ -1,7 +1,7 @@
-//! Queues: a thread each, which runs submissions in order on its own command processor.
+//! Queues: each has a thread, which runs submissions in order on its own command processor.
 //!
-//! A submission is a closure. If the device is lost, because an earlier submission panicked, the closures that wait
-//! are dropped without being run: whoever must wake waiters in that case does so in the `Drop` of what the closure
+//! A submission is a closure. If the device is lost, because an earlier submission panicked, the closures that wait are
+//! dropped without being run. Code that must wake waiters even then does so in the `Drop` of a value that the closure
 //! captures.
 
 use crate::abi::error::Error;
@@ -23,7 +23,7 @@ pub(crate) type Work = Box<dyn FnOnce(&mut CommandProcessor) + Send>;
 pub(crate) struct Queue {
     instance: Arc<Instance>,
     sync: Arc<DeviceSync>,
-    /// Gone once the queue is stopped.
+    /// The thread; None once the queue is stopped.
     worker: Mutex<Option<Worker>>,
 }
 
@@ -43,8 +43,7 @@ objects! {
 impl Queue {
     /// Starts the thread of a queue whose work runs on `processor`.
     ///
-    /// # Errors
-    /// [`Error::InitializationFailed`] if the host gives no thread.
+    /// # Errors [`Error::InitializationFailed`] if the host can't start a thread.
     pub(crate) fn start(
         instance: Arc<Instance>,
         sync: Arc<DeviceSync>,
@@ -70,7 +69,7 @@ impl Queue {
         &self.instance
     }
 
-    /// The things that are waited for on its device, and its loss.
+    /// The state that can be waited for on its device, and its loss.
     pub(crate) fn sync(&self) -> &Arc<DeviceSync> {
         &self.sync
     }
@@ -95,16 +94,16 @@ impl Queue {
     pub(crate) fn wait_idle(&self) -> Result<(), Error> {
         let (done, wait) = channel();
         self.submit(Box::new(move |_| {
-            // The receiver waits below for as long as this closure lives.
+            // The receiver exists as long as this closure.
             let _ = done.send(());
         }))?;
-        // The sender is dropped unsent only if the queue gave the work up.
+        // The sender is dropped without a message only if the queue dropped the work.
         let waited = wait.recv();
         self.sync.check()?;
         waited.map_err(|_| Error::DeviceLost("its queue has stopped".to_owned()))
     }
 
-    /// Executes what has been submitted, ends the thread and joins it.
+    /// Executes the submitted work, ends the thread and joins it.
     pub(crate) fn stop(&self) {
         let worker = self
             .worker
@@ -121,7 +120,7 @@ impl Queue {
     }
 }
 
-/// The queue's thread: runs work until the queue is stopped. After a panic it drops what comes instead of running it.
+/// The queue's thread: runs work until the queue is stopped. After a panic it drops further work instead of running it.
 fn run(work: &Receiver<Work>, mut processor: CommandProcessor, sync: &DeviceSync) {
     while let Ok(work) = work.recv() {
         let executed = catch_unwind(AssertUnwindSafe(|| {

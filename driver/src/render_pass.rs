@@ -21,7 +21,7 @@ pub(crate) struct RenderPass {
 /// An attachment of a render pass.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct AttachmentDescription {
-    /// The format of the view that the framebuffer gives.
+    /// The format of the framebuffer's view.
     pub(crate) format: vk::Format,
     /// The operation of its first use on colour or depth.
     pub(crate) load: vk::AttachmentLoadOp,
@@ -38,31 +38,31 @@ pub(crate) struct AttachmentDescription {
 pub(crate) struct Subpass {
     /// Colour attachments by location.
     pub(crate) color: Vec<Option<usize>>,
-    /// The attachments that colour attachments are resolved to, by location; may be short.
+    /// The resolve attachments of colour attachments, by location; there may be fewer.
     pub(crate) resolve: Vec<Option<usize>>,
     /// The depth and stencil attachment.
     pub(crate) depth_stencil: Option<usize>,
-    /// The attachment that it is resolved to, and how.
+    /// The resolve of the depth and stencil attachment, if there is one.
     pub(crate) depth_stencil_resolve: Option<DepthStencilResolve>,
-    /// Attachments that shaders read. Between subpasses they are in memory, so that they are images like any other.
+    /// Input attachments. Between subpasses they are in memory, so shaders read them like other images.
     pub(crate) input: Vec<Option<usize>>,
-    /// The views that draws are for, a bit each; 0 in a pass without views.
+    /// The views that draws render to, a bit each; 0 in a pass without views.
     pub(crate) view_mask: u32,
 }
 
 /// The resolve of a subpass's depth and stencil attachment.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct DepthStencilResolve {
-    /// The attachment that it is resolved to.
+    /// The resolve attachment.
     pub(crate) attachment: usize,
-    /// The way in which depth is resolved, if it is.
+    /// The resolve mode of depth, if it is resolved.
     pub(crate) depth: Option<ResolveMode>,
-    /// The way in which stencil is resolved, if it is.
+    /// The resolve mode of stencil, if it is resolved.
     pub(crate) stencil: Option<ResolveMode>,
 }
 
 impl Subpass {
-    /// The attachments that it uses.
+    /// The attachments that the subpass uses.
     fn attachments(&self) -> Vec<usize> {
         let lists = [&self.color, &self.resolve, &self.input];
         let mut all: Vec<_> = lists.into_iter().flatten().copied().flatten().collect();
@@ -71,7 +71,7 @@ impl Subpass {
         all
     }
 
-    /// The views that draws are for, a bit each; the first one in a pass without views.
+    /// The views that draws render to, a bit each; the first one in a pass without views.
     fn views(&self) -> u32 {
         match self.view_mask {
             0 => 1,
@@ -79,17 +79,17 @@ impl Subpass {
         }
     }
 
-    /// The layers of attachments that it renders to, of a framebuffer of so many layers.
+    /// The number of attachment layers that it renders to, in a framebuffer of `framebuffer` layers.
     pub(crate) fn layers(&self, framebuffer: u32) -> u32 {
         layers(self.view_mask, framebuffer)
     }
 
-    /// Tells if it uses attachment number `index`.
+    /// Reports whether it uses attachment number `index`.
     fn uses(&self, index: usize) -> bool {
         self.attachments().contains(&index)
     }
 
-    /// Tells if it renders to attachment number `index`, or resolves to it.
+    /// Reports whether it renders to attachment number `index`, or resolves to it.
     fn writes(&self, index: usize) -> bool {
         let resolved = self.depth_stencil_resolve.map(|resolve| resolve.attachment);
         let lists = [&self.color, &self.resolve];
@@ -107,7 +107,7 @@ impl RenderPass {
     /// A render pass.
     ///
     /// # Errors
-    /// [`Error::InvalidUsage`] if there is no subpass or a subpass names an attachment that isn't there.
+    /// [`Error::InvalidUsage`] if there is no subpass or a subpass names an attachment that doesn't exist.
     pub(crate) fn new(
         attachments: Vec<AttachmentDescription>,
         subpasses: Vec<Subpass>,
@@ -128,8 +128,8 @@ impl RenderPass {
         })
     }
 
-    /// The views of attachment number `index` that `subpass` is the first to use, a bit each. A pass without views is as one
-    /// of one view.
+    /// The views, a bit each, for which `subpass` is the first to use attachment number `index`. A pass without views
+    /// counts as one with one view.
     pub(crate) fn first_views(&self, subpass: usize, index: usize) -> u32 {
         let earlier = self.subpasses[..subpass].iter();
         let used = earlier
@@ -138,18 +138,18 @@ impl RenderPass {
         self.subpasses[subpass].views() & !used
     }
 
-    /// Tells if `subpass` is the first to use attachment number `index`, in all of its views.
+    /// Reports whether `subpass` is the first to use attachment number `index`, in all of its views.
     pub(crate) fn is_first_use(&self, subpass: usize, index: usize) -> bool {
         self.first_views(subpass, index) == self.subpasses[subpass].views()
     }
 
-    /// Tells if `subpass` is the last to use attachment number `index`.
+    /// Reports whether `subpass` is the last to use attachment number `index`.
     pub(crate) fn is_last_use(&self, subpass: usize, index: usize) -> bool {
         !self.subpasses[subpass + 1..].iter().any(|s| s.uses(index))
     }
 
-    /// The attachments that `subpass` is the first to use and only reads, or the first to use in some of its views: they
-    /// are loaded before it begins.
+    /// The attachments that must be loaded before `subpass` begins: those that it is the first to use and only reads,
+    /// or the first to use in only some of its views.
     pub(crate) fn loaded_before(&self, subpass: usize) -> Vec<usize> {
         let Some(used) = self.subpasses.get(subpass) else {
             return Vec::new();
@@ -160,7 +160,7 @@ impl RenderPass {
             .collect()
     }
 
-    /// The formats of a subpass's colour attachments; undefined where unused.
+    /// The formats of a subpass's colour attachments; undefined if unused.
     pub(crate) fn color_formats(&self, subpass: usize) -> Option<Vec<vk::Format>> {
         let subpass = self.subpasses.get(subpass)?;
         let format = |used: &Option<usize>| {
@@ -175,8 +175,8 @@ impl RenderPass {
 /// A framebuffer.
 #[derive(Debug)]
 pub(crate) struct Framebuffer {
-    /// The views, in the order of the render pass's attachments; `None` for an imageless framebuffer, whose views
-    /// come when a pass begins.
+    /// The views, in the order of the render pass's attachments; `None` for an imageless framebuffer, whose views are
+    /// given when a pass begins.
     pub(crate) views: Option<Vec<Arc<ImageView>>>,
     /// Its width and height in pixels.
     pub(crate) extent: vk::Extent2D,
@@ -184,12 +184,12 @@ pub(crate) struct Framebuffer {
     pub(crate) layers: u32,
 }
 
-/// A reference's attachment, if it is used.
+/// The index of a reference's attachment; None if it is unused.
 fn used(attachment: u32) -> Option<usize> {
     (attachment != vk::ATTACHMENT_UNUSED).then_some(attachment as usize)
 }
 
-/// The layers that attachments must have for views, or for `layers` without views.
+/// The number of layers that attachments need for views; without views, `layers`.
 pub(crate) fn layers(view_mask: u32, layers: u32) -> u32 {
     match view_mask {
         0 => layers,
@@ -197,8 +197,8 @@ pub(crate) fn layers(view_mask: u32, layers: u32) -> u32 {
     }
 }
 
-/// The subpass of a description of either version, without a resolve of depth and stencil. The description's pointers are
-/// valid.
+/// Converts a subpass description of either version, without a resolve of depth and stencil. The description's pointers
+/// are valid.
 macro_rules! subpass {
     ($description:expr) => {{
         let description = $description;
@@ -223,8 +223,8 @@ macro_rules! subpass {
     }};
 }
 
-/// The render pass of a create info of either version, of whose descriptions `subpass` makes subpasses. The info's pointers
-/// are valid.
+/// Converts a render pass's create info of either version, with the macro `subpass` for its subpasses. The info's
+/// pointers are valid.
 macro_rules! render_pass {
     ($info:expr, $subpass:expr) => {{
         let info = $info;
@@ -310,7 +310,7 @@ pub(crate) unsafe fn create_render_pass2(
     }
 }
 
-/// Any area is as good as any other.
+/// Returns a granularity of one pixel: no area is faster than another.
 #[doc(alias = "vkGetRenderAreaGranularity")]
 pub(crate) fn get_render_area_granularity() -> Result<vk::Extent2D, Error> {
     Ok(vk::Extent2D {

@@ -1,5 +1,5 @@
-//! Shader modules: SPIR-V, kept as words until a pipeline is made of it, and the stages of pipelines, which are entry points
-//! of them. A module may declare those of SPIR-V's capabilities that its device has enabled.
+//! Shader modules: SPIR-V, kept as words until a pipeline uses it; and the shader stages of pipelines, which are entry
+//! points of modules. A module may declare only capabilities that its device has enabled.
 
 use crate::abi::error::Error;
 use crate::abi::handle::{self, objects};
@@ -16,7 +16,7 @@ use spirv::{Capability, Op};
 use std::ffi::CStr;
 use std::sync::Arc;
 
-/// The first word of SPIR-V.
+/// The first word of a SPIR-V module.
 const MAGIC: u32 = 0x0723_0203;
 
 /// A shader module.
@@ -64,11 +64,10 @@ impl ShaderModule {
     }
 }
 
-/// Refuses a module that declares a capability that isn't enabled. Capabilities that the translator doesn't know are its
-/// own to refuse.
+/// Refuses a module that declares a capability that isn't enabled. Capabilities that the translator doesn't know are
+/// left for it to refuse.
 ///
-/// # Errors
-/// [`Error::FeatureNotEnabled`] names the capability and what would enable it.
+/// # Errors [`Error::FeatureNotEnabled`] names the capability and the features or extensions that enable it.
 fn check_capabilities(
     words: &[u32],
     features: &Features,
@@ -83,7 +82,7 @@ fn check_capabilities(
     }
 }
 
-/// Tells if one of the things that enable a capability is there.
+/// Reports whether one of the features or extensions that enable a capability is enabled.
 fn is_enabled(capability: Capability, features: &Features, extensions: &[&CStr]) -> bool {
     let enables = enables(capability);
     enables.is_empty()
@@ -96,7 +95,7 @@ fn is_enabled(capability: Capability, features: &Features, extensions: &[&CStr])
 }
 
 fn not_enabled(capability: Capability) -> Error {
-    // What the device doesn't know is of interest only where nothing else would do.
+    // Things that the device doesn't support are named only if it supports none.
     let known: Vec<_> = enables(capability)
         .iter()
         .filter_map(|enable| match enable {
@@ -126,7 +125,8 @@ fn not_enabled(capability: Capability) -> Error {
     }
 }
 
-/// The capabilities that a module declares. They come first in it; what is malformed is left to those who translate it.
+/// The capabilities that a module declares, which come first in it. Malformed words are left for the translator to
+/// refuse.
 fn declared(words: &[u32]) -> impl Iterator<Item = Capability> {
     const HEADER_WORDS: usize = 5;
     let mut rest = words.get(HEADER_WORDS..).unwrap_or_default();
@@ -156,8 +156,7 @@ pub(crate) struct ShaderStage<'a> {
 impl<'a> ShaderStage<'a> {
     /// The stage of a create info.
     ///
-    /// # Errors
-    /// [`Error::InvalidUsage`] for a name or a subgroup size that is none.
+    /// # Errors [`Error::InvalidUsage`] for an invalid name or subgroup size.
     ///
     /// # Safety
     /// The create info and its chain are valid.
@@ -262,7 +261,7 @@ mod tests {
         for &capability in capabilities {
             words.extend([2 << 16 | Op::Capability as u32, capability as u32]);
         }
-        // OpMemoryModel Logical GLSL450.
+        // The words of `OpMemoryModel Logical GLSL450`.
         words.extend([3 << 16 | Op::MemoryModel as u32, 0, 1]);
         words
     }

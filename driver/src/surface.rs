@@ -1,4 +1,4 @@
-//! Surfaces: the windows that applications present to, and what they can show.
+//! Surfaces: the windows to which applications present, and their capabilities.
 
 use crate::abi::error::Error;
 use crate::abi::handle::objects;
@@ -15,13 +15,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// The extent of a surface that gets the size of its swapchain's images.
+/// The extent of a surface whose size is that of its swapchain's images.
 const OF_THE_SWAPCHAIN: vk::Extent2D = vk::Extent2D {
     width: u32::MAX,
     height: u32::MAX,
 };
 
-/// The formats of pictures: what window systems take without a conversion.
+/// The formats of presented images: those that window systems accept without a conversion.
 const FORMATS: [vk::SurfaceFormatKHR; 2] = [
     vk::SurfaceFormatKHR {
         format: vk::Format::B8G8R8A8_UNORM,
@@ -36,7 +36,7 @@ const FORMATS: [vk::SurfaceFormatKHR; 2] = [
 /// A surface.
 pub(crate) struct Surface {
     window: Box<dyn Window>,
-    /// A swapchain presents to it that no other has replaced.
+    /// True if a swapchain presents to it that no other has replaced.
     is_taken: AtomicBool,
 }
 
@@ -50,7 +50,7 @@ impl Surface {
         })
     }
 
-    /// Takes it for a swapchain, which only one at a time may.
+    /// Reserves it for a swapchain; only one at a time can have it.
     ///
     /// # Errors
     /// [`Error::NativeWindowInUse`].
@@ -61,12 +61,12 @@ impl Surface {
         Ok(())
     }
 
-    /// Gives it back.
+    /// Ends the reservation.
     pub(crate) fn give_back(&self) {
         self.is_taken.store(false, Ordering::Release);
     }
 
-    /// The size of its window; `None` where it gets that of the pictures.
+    /// The size of its window; `None` if it has the size of the presented images.
     ///
     /// # Errors
     /// [`Error::SurfaceLost`].
@@ -74,10 +74,9 @@ impl Surface {
         self.window.extent().map_err(Error::SurfaceLost)
     }
 
-    /// The window's place for a swapchain's pictures.
+    /// Prepares the window for a swapchain's images.
     ///
-    /// # Errors
-    /// [`Error::SurfaceLost`], or [`Error::InvalidUsage`] for a mode that it doesn't have.
+    /// # Errors [`Error::SurfaceLost`], or [`Error::InvalidUsage`] for an unsupported present mode.
     pub(crate) fn canvas(
         &self,
         extent: vk::Extent2D,
@@ -139,7 +138,7 @@ impl Surface {
     }
 }
 
-/// The usages that images of the first format have.
+/// The supported usages of images of the first format.
 fn usages() -> vk::ImageUsageFlags {
     let all = [
         vk::ImageUsageFlags::TRANSFER_SRC,
@@ -171,7 +170,7 @@ fn present_mode(mode: PresentMode) -> vk::PresentModeKHR {
     }
 }
 
-/// The window of a headless surface: nobody sees it, and its display takes every picture at once.
+/// The window of a headless surface: nothing is visible, and every image is accepted at once.
 struct Headless;
 
 impl Window for Headless {
@@ -249,7 +248,7 @@ pub(crate) unsafe fn create_xlib_surface(
 ) -> Result<Arc<Surface>, Error> {
     let window = NativeWindow::Xlib {
         display: not_null(create_info.dpy, "Display")?,
-        // Ids have 29 bits, whatever the type's width.
+        // Window ids have 29 bits, whatever the width of their type.
         window: create_info.window as u32,
     };
     // SAFETY: the caller's promise.
@@ -270,13 +269,13 @@ pub(crate) unsafe fn create_wayland_surface(
     unsafe { create_surface(ash::khr::wayland_surface::NAME, window) }
 }
 
-/// Pictures are copied to windows, which any queue can have done.
+/// Returns true: presentation copies images to windows, which any queue can do.
 #[doc(alias = "vkGetPhysicalDeviceSurfaceSupportKHR")]
 pub(crate) fn get_physical_device_surface_support(_surface: &Surface) -> Result<vk::Bool32, Error> {
     Ok(vk::TRUE)
 }
 
-/// Any window can be presented to; of which depth a window is, is found out when it is.
+/// Returns true: any window can be presented to. A window's depth is checked when its surface is used.
 #[doc(alias = "vkGetPhysicalDeviceXcbPresentationSupportKHR")]
 #[doc(alias = "vkGetPhysicalDeviceXlibPresentationSupportKHR")]
 #[doc(alias = "vkGetPhysicalDeviceWaylandPresentationSupportKHR")]
@@ -326,7 +325,7 @@ pub(crate) fn get_physical_device_surface_present_modes(
     Ok(modes.copied().map(present_mode).collect())
 }
 
-/// The whole window.
+/// Returns one rectangle, the whole window.
 #[doc(alias = "vkGetPhysicalDevicePresentRectanglesKHR")]
 pub(crate) fn get_physical_device_present_rectangles(
     surface: &Surface,
@@ -337,7 +336,7 @@ pub(crate) fn get_physical_device_present_rectangles(
     }])
 }
 
-/// A group has one device, which presents what it has drawn.
+/// Returns that the group's only device presents its own images.
 #[doc(alias = "vkGetDeviceGroupSurfacePresentModesKHR")]
 pub(crate) fn get_device_group_surface_present_modes(
     _surface: &Surface,

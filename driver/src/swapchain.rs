@@ -1,7 +1,7 @@
 //! Swapchains: images that are acquired, drawn to and presented.
 //!
-//! What is presented waits for its turn in a list; a thread of the swapchain takes it from there when the display is ready,
-//! copies the image to the window, and then the image can be acquired again. So no queue waits for a display.
+//! A presented image waits in a list. When the display is ready, a thread of the swapchain takes it from there and
+//! copies it to the window; then the image can be acquired again. So no queue waits for a display.
 
 use crate::abi::error::Error;
 use crate::abi::guard::panic_message;
@@ -25,7 +25,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// Time that a swapchain's thread waits for the display before it looks if it should end.
+/// The time that a swapchain's thread waits for the display before it checks whether it should end.
 const PATIENCE: Duration = Duration::from_millis(50);
 
 /// A swapchain.
@@ -54,42 +54,42 @@ impl Drop for PresentableImage {
     }
 }
 
-/// The things that a swapchain shares with its thread and with submissions.
+/// The data that a swapchain shares with its thread and with submissions.
 struct Shared {
     sync: Arc<DeviceSync>,
     present_mode: PresentMode,
     images: Vec<Arc<Image>>,
     state: Mutex<State>,
-    /// Something was presented, or the thread should end.
+    /// Signaled when an image was presented, or the thread should end.
     changed: Condvar,
-    /// The reason that nothing can be shown any more.
+    /// The reason that nothing can be presented any more.
     lost: OnceLock<WindowLost>,
 }
 
 #[derive(Default)]
 struct State {
-    /// Images that can be acquired, in the order in which they were given back.
+    /// Images that can be acquired, in the order in which they became free.
     free: VecDeque<u32>,
     /// Images that are acquired, and not yet presented.
     acquired: Vec<u32>,
     /// Images that wait to be shown.
     waiting: VecDeque<u32>,
-    /// Another swapchain has taken the surface over, or this one is being destroyed.
+    /// True if another swapchain has replaced this one, or it is being destroyed.
     is_retired: bool,
 }
 
 impl Shared {
     fn state(&self) -> MutexGuard<'_, State> {
-        // Lists of numbers stay usable whatever panics.
+        // Lists of numbers are consistent after any panic.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Makes images free to be acquired.
+    /// Makes images available to be acquired.
     fn release(&self, images: impl IntoIterator<Item = u32>) {
         self.sync.update(|| self.state().free.extend(images));
     }
 
-    /// Lets an image wait for its turn.
+    /// Appends an image to the list of those that wait to be shown.
     fn present(&self, index: u32) {
         let mut state = self.state();
         let dropped = if state.is_retired || self.lost.get().is_some() {
@@ -109,14 +109,14 @@ impl Shared {
         }
     }
 
-    /// Waits until there is something to show; `false` when there won't be.
+    /// Waits until there is an image to show. Returns `false` if there won't be one.
     fn wait_for_picture(&self) -> bool {
         let is_idle = |state: &mut State| state.waiting.is_empty() && !state.is_retired;
         let state = self.changed.wait_while(self.state(), is_idle);
         !state.unwrap_or_else(PoisonError::into_inner).is_retired
     }
 
-    /// Shows what is presented until the swapchain is retired.
+    /// Shows presented images until the swapchain is retired.
     fn run(&self, canvas: &mut dyn Canvas) -> Result<(), WindowLost> {
         while self.wait_for_picture() {
             if self.present_mode != PresentMode::Immediate {
@@ -126,7 +126,7 @@ impl Shared {
                     }
                 }
             }
-            // A newer one may have taken its place meanwhile.
+            // A newer image may have replaced it meanwhile.
             let Some(index) = self.state().waiting.pop_front() else {
                 continue;
             };
@@ -151,7 +151,7 @@ impl Shared {
         }
     }
 
-    /// Ends the thread after what it is doing, and gives up what waits.
+    /// Ends the thread after its current image, and drops the waiting ones.
     fn retire(&self) {
         let mut state = self.state();
         state.is_retired = true;
@@ -161,7 +161,7 @@ impl Shared {
         self.release(waiting);
     }
 
-    /// Marks the window as lost and wakes who waits for an image.
+    /// Marks the window as lost and wakes threads that wait for an image.
     fn lose(&self, reason: WindowLost) {
         log::warn!("{reason}");
         self.sync.update(|| {
@@ -173,7 +173,7 @@ impl Shared {
 }
 
 impl Swapchain {
-    /// Fails if nothing can be shown any more.
+    /// Fails if nothing can be presented any more.
     fn check(&self) -> Result<(), Error> {
         match self.shared.lost.get() {
             Some(lost) => Err(Error::SurfaceLost(lost.clone())),
@@ -181,7 +181,7 @@ impl Swapchain {
         }
     }
 
-    /// Tells if its images are as the window wants them: `VK_SUCCESS`, `VK_SUBOPTIMAL_KHR` if that has another size, or
+    /// The status of its images: `VK_SUCCESS`, `VK_SUBOPTIMAL_KHR` if the window has another size, or
     /// `VK_ERROR_OUT_OF_DATE_KHR` if another swapchain has replaced this one.
     ///
     /// # Errors
@@ -198,7 +198,7 @@ impl Swapchain {
         })
     }
 
-    /// Stops showing.
+    /// Stops presenting.
     fn retire(&self) {
         self.shared.retire();
         let thread = self.thread.lock();
@@ -261,7 +261,7 @@ pub(crate) fn create_swapchain(
     old_swapchain: Option<&Swapchain>,
 ) -> Result<Arc<Swapchain>, Error> {
     let info = create_info;
-    // It is retired even if what follows fails.
+    // It is retired even if a later step fails.
     if let Some(old) = old_swapchain {
         old.retire();
     }
@@ -361,14 +361,14 @@ pub(crate) fn acquire_next_image(
         }
     }
     let mut state = shared.state();
-    // Only one thread at a time may acquire of a swapchain.
+    // Only one thread at a time may acquire images of a swapchain.
     let Some(index) = state.free.pop_front() else {
         return Ok(vk::Result::NOT_READY);
     };
     state.acquired.push(index);
     drop(state);
     *image_index = index;
-    // The image was copied to the window before it was free.
+    // The image has been copied to the window before it became free.
     if let Some(semaphore) = semaphore {
         semaphore.signal(0);
     }
@@ -378,7 +378,7 @@ pub(crate) fn acquire_next_image(
     Ok(status)
 }
 
-/// The end of one swapchain's presentation, as the application is told of it.
+/// Presents one swapchain's image. Returns the result for the application.
 fn present_one(queue: &Queue, swapchain: &Swapchain, index: u32) -> Result<vk::Result, Error> {
     let shared = &swapchain.shared;
     let mut state = shared.state();
@@ -395,14 +395,13 @@ fn present_one(queue: &Queue, swapchain: &Swapchain, index: u32) -> Result<vk::R
     state.acquired.swap_remove(place);
     drop(state);
     let status = swapchain.status();
-    // It is free again even if it can't be shown.
+    // It becomes free again even if it can't be shown.
     let shared = Arc::clone(shared);
     queue.submit(Box::new(move |_| shared.present(index)))?;
     status
 }
 
-/// # Safety
-/// The info, its chain and its handles are valid, and its results are null or have room.
+/// # Safety The info, its chain and its handles are valid, and its results are null or have enough elements.
 #[doc(alias = "vkQueuePresentKHR")]
 pub(crate) unsafe fn queue_present(
     queue: &Queue,
@@ -437,7 +436,7 @@ pub(crate) unsafe fn queue_present(
         if let Some(out) = results.next() {
             out.write(result.as_ref().map_or_else(Error::result, |&code| code));
         }
-        // The worst of them: an error before suboptimal, that before success.
+        // The worst result: errors are worse than suboptimal, and that is worse than success.
         let is_worse = |code: &vk::Result| *code != vk::Result::SUCCESS;
         whole = match (whole, result) {
             (Err(error), _) | (_, Err(error)) => Err(error),
@@ -448,7 +447,7 @@ pub(crate) unsafe fn queue_present(
     whole
 }
 
-/// Binds images to memory, or to that of a swapchain's image.
+/// Binds images to memory, or to the memory of a swapchain's image.
 ///
 /// # Safety
 /// The infos, their chains and their handles are valid.
@@ -488,7 +487,7 @@ mod tests {
     use super::*;
     use std::sync::mpsc::{Receiver, Sender, channel};
 
-    /// A display that is refreshed when the test says so, and is lost when the test hangs up.
+    /// A display whose refreshes the test triggers, and which is lost when the test drops its sender.
     struct Display(Receiver<()>);
 
     impl Canvas for Display {
@@ -506,7 +505,7 @@ mod tests {
         }
     }
 
-    /// What runs on a thread for three images, and the display's refresh.
+    /// Starts a thread that presents three images. Returns it with the shared data and the sender of refreshes.
     fn start(present_mode: PresentMode) -> (Arc<Shared>, Sender<()>, JoinHandle<()>) {
         let shared = Arc::new(Shared {
             sync: Arc::default(),
@@ -526,7 +525,7 @@ mod tests {
         (shared, refresh, thread)
     }
 
-    /// Waits until so many images are free, and says which.
+    /// Waits until `count` images are free. Returns them.
     fn free(shared: &Shared, count: usize) -> Vec<u32> {
         let is_free = || shared.state().free.len() >= count;
         let waited = shared.sync.wait(deadline(20_000_000_000), is_free);
@@ -578,7 +577,7 @@ mod tests {
             assert_eq!(given_up, [0, 1]);
             thread.join().unwrap();
             assert_eq!(shared.lost.get().is_some(), !retires);
-            // What comes later is given up at once.
+            // A later image is dropped at once.
             shared.present(2);
             assert_eq!(free(&shared, 3).last(), Some(&2));
         }

@@ -30,18 +30,18 @@ impl Fence {
         }
     }
 
-    /// Tells if it is signaled.
+    /// Reports whether it is signaled.
     pub(crate) fn is_signaled(&self) -> bool {
         self.signaled.load(Ordering::Acquire)
     }
 
-    /// DeviceSync it.
+    /// Signals the fence.
     pub(crate) fn signal(&self) {
         self.sync
             .update(|| self.signaled.store(true, Ordering::Release));
     }
 
-    /// Makes it unsignaled.
+    /// Resets the fence.
     pub(crate) fn reset(&self) {
         self.signaled.store(false, Ordering::Release);
     }
@@ -69,7 +69,7 @@ impl Semaphore {
         }
     }
 
-    /// A timeline semaphore with that value.
+    /// A timeline semaphore with an initial value.
     pub(crate) fn new_timeline(sync: Arc<DeviceSync>, value: u64) -> Self {
         Self {
             sync,
@@ -77,7 +77,7 @@ impl Semaphore {
         }
     }
 
-    /// A timeline semaphore's value; `None` for a binary one.
+    /// The value of a timeline semaphore; `None` for a binary one.
     pub(crate) fn value(&self) -> Option<u64> {
         match &self.payload {
             Payload::Binary(_) => None,
@@ -85,18 +85,18 @@ impl Semaphore {
         }
     }
 
-    /// DeviceSync it; a timeline semaphore gets `value`.
+    /// Signals the semaphore; a timeline semaphore gets `value`.
     pub(crate) fn signal(&self, value: u64) {
         self.sync.update(|| match &self.payload {
             Payload::Binary(signaled) => signaled.store(true, Ordering::Release),
-            // A smaller value is the application's error; a timeline never runs backwards.
+            // A smaller value is the application's error; a timeline never decreases.
             Payload::Timeline(current) => {
                 current.fetch_max(value, Ordering::AcqRel);
             }
         });
     }
 
-    /// Tells if a wait for `value` (which a binary semaphore ignores) is over.
+    /// Reports whether a wait for `value` (which a binary semaphore ignores) has ended.
     pub(crate) fn is_reached(&self, value: u64) -> bool {
         match &self.payload {
             Payload::Binary(signaled) => signaled.load(Ordering::Acquire),
@@ -128,12 +128,12 @@ impl Event {
         }
     }
 
-    /// Tells if it is set.
+    /// Reports whether it is set.
     pub(crate) fn is_set(&self) -> bool {
         self.value.load(Ordering::Acquire)
     }
 
-    /// Sets or resets it.
+    /// Sets or resets the event.
     pub(crate) fn set(&self, value: bool) {
         self.sync
             .update(|| self.value.store(value, Ordering::Release));

@@ -1,12 +1,12 @@
-//! Windows of the host's window systems, as the driver wants them: what shows a picture there is given to the driver, so
-//! that it can be had without the libraries of any. `driver/window` has X11 and Wayland.
+//! The interface to the host's window systems. The driver receives them from outside, so that it can be built without
+//! their libraries. `driver/window` implements X11 and Wayland.
 
 use std::ffi::{CStr, c_void};
 use std::ptr::NonNull;
 use std::sync::OnceLock;
 use std::time::Duration;
 
-/// A window, as an application names it to Vulkan.
+/// A window, as an application passes it to Vulkan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NativeWindow {
     /// A window of X11 over libxcb.
@@ -32,39 +32,37 @@ pub enum NativeWindow {
     },
 }
 
-/// A window system: opens the windows of one of Vulkan's extensions of surfaces.
+/// A window system, which opens the windows of one of Vulkan's surface extensions.
 pub trait WindowSystem: Sync {
-    /// The instance extension whose surfaces it opens.
+    /// The instance extension of its surfaces.
     fn extension(&self) -> &'static CStr;
 
     /// Opens a window.
     ///
-    /// # Errors
-    /// [`WindowLost`] if it can't be shown to, or is of another window system.
+    /// # Errors [`WindowLost`] if pictures can't be shown in it, or it is of another window system.
     ///
-    /// # Safety
-    /// The window's pointers are what they are said to be, and stay so until what is returned and all made of it are
+    /// # Safety The window's pointers are valid, and stay so until the returned window and everything made of it are
     /// dropped.
     unsafe fn open(&self, window: NativeWindow) -> Result<Box<dyn Window>, WindowLost>;
 }
 
-/// A window that cannot be shown to: it was closed, or its server is gone. The text says what happened.
+/// The loss of a window, which was closed or whose server has ended. The text says what happened.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the window is lost: {0}")]
 pub struct WindowLost(pub String);
 
-/// A window to which pictures are shown.
+/// A window in which pictures are shown.
 pub trait Window: Send + Sync {
-    /// Its width and height in pixels now; `None` where a window gets the size of the pictures that it is shown.
+    /// Its present width and height in pixels; `None` if the window takes the size of its pictures.
     ///
     /// # Errors
     /// [`WindowLost`].
     fn extent(&self) -> Result<Option<[u32; 2]>, WindowLost>;
 
-    /// The ways in which pictures are shown to it.
+    /// The supported present modes.
     fn present_modes(&self) -> &'static [PresentMode];
 
-    /// Tells if what is behind it can be seen through pictures with an alpha below 1.
+    /// Reports whether the background is visible through pictures with an alpha below 1.
     fn has_alpha(&self) -> bool;
 
     /// Prepares for pictures of one size.
@@ -74,45 +72,46 @@ pub trait Window: Send + Sync {
     fn canvas(&self, options: CanvasOptions) -> Result<Box<dyn Canvas>, WindowLost>;
 }
 
-/// A way in which pictures are shown: one of `VkPresentModeKHR`.
+/// A present mode: one of `VkPresentModeKHR`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PresentMode {
-    /// Each at once.
+    /// Each picture is shown at once.
     Immediate,
-    /// The newest at each refresh of the display.
+    /// At each refresh of the display, the newest picture is shown.
     Mailbox,
-    /// One at each refresh of the display, in order.
+    /// At each refresh of the display, the next picture is shown, in order.
     Fifo,
 }
 
-/// The pictures that a window will be shown.
+/// The properties of the pictures that a window will show.
 #[derive(Clone, Copy, Debug)]
 pub struct CanvasOptions {
     /// Their width and height in pixels.
     pub extent: [u32; 2],
-    /// How they are shown.
+    /// The present mode.
     pub present_mode: PresentMode,
-    /// Alpha counts: colours are premultiplied with it.
+    /// True if alpha is used: colours are premultiplied with it.
     pub has_alpha: bool,
 }
 
-/// A window's place for pictures of one size. It is used on a thread of its own.
+/// A window prepared for pictures of one size. It is used on a thread of its own.
 pub trait Canvas: Send {
-    /// Waits until the display takes the next picture, at most for `longest`; tells if it does. Of mode
+    /// Waits until the display accepts the next picture, at most for `longest`. Returns true if it does. In mode
     /// [`PresentMode::Immediate`] it always does.
     ///
     /// # Errors
     /// [`WindowLost`].
     fn wait(&mut self, longest: Duration) -> Result<bool, WindowLost>;
 
-    /// Shows a picture, which `copy` writes: rows without gaps from the top, a pixel's blue, green, red and alpha a byte each.
+    /// Shows a picture. `copy` writes its pixels: rows without gaps from the top, with a byte each for blue, green, red
+    /// and alpha.
     ///
     /// # Errors
     /// [`WindowLost`].
     fn show(&mut self, copy: &mut dyn FnMut(&mut [u8])) -> Result<(), WindowLost>;
 }
 
-/// The extensions of surfaces that are there if a window system is given that opens them.
+/// The surface extensions that are available only if a window system for them is registered.
 const OF_WINDOW_SYSTEMS: [&CStr; 3] = [
     ash::khr::wayland_surface::NAME,
     ash::khr::xcb_surface::NAME,
@@ -121,8 +120,7 @@ const OF_WINDOW_SYSTEMS: [&CStr; 3] = [
 
 static WINDOW_SYSTEMS: OnceLock<&[&dyn WindowSystem]> = OnceLock::new();
 
-/// Gives the driver the window systems of this process, before the first instance is created. The first that are given
-/// stay.
+/// Registers the window systems of this process, before the first instance is created. Later calls have no effect.
 pub fn use_window_systems(systems: &'static [&'static dyn WindowSystem]) {
     WINDOW_SYSTEMS.get_or_init(|| systems);
 }
@@ -136,7 +134,7 @@ pub(crate) fn window_system(extension: &CStr) -> Option<&'static dyn WindowSyste
         .find(|system| system.extension() == extension)
 }
 
-/// Tells if an instance extension is there: those of window systems are there with them.
+/// Reports whether an instance extension is available: those of window systems are, if a window system is registered.
 pub(crate) fn is_available(extension: &CStr) -> bool {
     !OF_WINDOW_SYSTEMS.contains(&extension) || window_system(extension).is_some()
 }

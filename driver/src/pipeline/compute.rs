@@ -73,7 +73,7 @@ impl ComputePipeline {
     }
 }
 
-/// The number of invocations that a workgroup has.
+/// The number of invocations of a workgroup.
 fn invocations(interface: &Interface) -> Result<u32, Error> {
     let size = interface.workgroup_size;
     let product = size
@@ -91,7 +91,7 @@ fn invocations(interface: &Interface) -> Result<u32, Error> {
         })
 }
 
-/// The values that the device puts into the program's inputs.
+/// The values that the device gives to the program's inputs.
 fn inputs(interface: &Interface) -> Vec<Option<ComputeInput>> {
     let input = |input: &Input| match input.source {
         InputSource::BuiltIn {

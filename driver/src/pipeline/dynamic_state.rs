@@ -1,4 +1,4 @@
-//! Dynamic state: the table of what a command buffer may set, and what it has set.
+//! Dynamic state: the table of states that a command buffer may set, and the states that it has set.
 
 use super::state::{BlendEquations, FixedFunctionState as Fixed};
 use crate::convert::StencilOps;
@@ -9,7 +9,7 @@ use simdevice::state::{CompareOp, DepthBias, LogicOp, PolygonMode, Topology};
 /// The face that a stencil state is for: 0 is the front, 1 the back.
 pub(crate) type Face = usize;
 
-/// The extension's dynamic states, beside Vulkan's.
+/// The names of the extension's dynamic states, as Vulkan's.
 pub(super) trait GaussianStates {
     const GAUSSIAN_ORDER: Self;
     const GAUSSIAN_ANTIALIASING: Self;
@@ -39,7 +39,7 @@ impl GaussianStates for vk::DynamicState {
         gaurast::vk::DYNAMIC_STATE_GAUSSIAN_CONTRIBUTION_BUDGET_GAURAST;
 }
 
-/// Tells if a state is one of the extension's.
+/// Reports whether a state is one of the extension's.
 pub(super) fn is_of_gaussians(state: vk::DynamicState) -> bool {
     use vk::DynamicState as S;
     [
@@ -56,28 +56,28 @@ pub(super) fn is_of_gaussians(state: vk::DynamicState) -> bool {
     .contains(&state)
 }
 
-/// The use that Gaussians make of a dynamic state.
+/// The use of a dynamic state by Gaussians.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Gaussians {
-    /// It says what becomes of their fragments.
+    /// The state affects their fragments.
     Taken,
     /// It has no effect on them.
     Ignored,
-    /// A pipeline of theirs may not have it dynamic.
+    /// The state may not be dynamic in a pipeline of Gaussians.
     Refused,
 }
 
 /// A row of the table.
 struct Row {
     state: vk::DynamicState,
-    /// Tells if a draw with the rest of the state needs it to be set.
+    /// Reports whether a draw with the rest of the state needs it to be set.
     is_needed: fn(&Fixed) -> bool,
     gaussians: Gaussians,
 }
 
-/// The table: `LINE_WIDTH => LineWidth(width: f32), set .., needed .., gaussians ..;` is the state of that name, its value, how
-/// the value becomes part of fixed-function state, when a draw needs it to be set, and what Gaussians make of it. A state
-/// that each face, or each colour attachment, has of its own names that in brackets.
+/// Defines the table. `LINE_WIDTH => LineWidth(width: f32), set .., needed .., gaussians ..;` gives a state's name and
+/// value, the function that puts the value into fixed-function state, the condition under which a draw needs it to be
+/// set, and the use by Gaussians. A state of each face, or of each colour attachment, has that in brackets.
 macro_rules! dynamic_states {
     ($(
         $state:ident => $variant:ident $([$face:ident])? ($value:ident: $type:ty),
@@ -97,7 +97,7 @@ macro_rules! dynamic_states {
         },)*];
 
         impl DynamicState {
-            /// The state and the face that it is for, if it is for one.
+            /// The state, and its face if it is set for a face.
             fn key(self) -> (vk::DynamicState, Option<Face>) {
                 match self {
                     $(Self::$variant { $($face,)? .. } => {
@@ -106,7 +106,7 @@ macro_rules! dynamic_states {
                 }
             }
 
-            /// Makes it part of fixed-function state.
+            /// Puts the value into fixed-function state.
             pub(crate) fn apply(self, state: &mut Fixed) {
                 fn apply(state: &mut Fixed, set: impl FnOnce(&mut Fixed)) {
                     set(state);
@@ -218,8 +218,8 @@ dynamic_states! {
         needed Fixed::has_colors, gaussians Refused;
 }
 
-/// The dynamic states that are looked up for each draw, and that no row has a value of: viewports, scissors, strides and
-/// vertex input; and the stipple of lines, which have none. Gaussians may have all but the last two.
+/// The dynamic states that are looked up for each draw, and for which no row has a value: viewports, scissors, strides
+/// and vertex input; and the stipple of lines, which is unused. For Gaussians all but the last two are allowed.
 const LOOKED_UP: [vk::DynamicState; 7] = [
     vk::DynamicState::VIEWPORT,
     vk::DynamicState::VIEWPORT_WITH_COUNT,
@@ -234,29 +234,29 @@ fn row(state: vk::DynamicState) -> Option<&'static Row> {
     ROWS.iter().find(|row| row.state == state)
 }
 
-/// Tells if the driver has a dynamic state.
+/// Reports whether the driver supports a dynamic state.
 pub(crate) fn is_supported(state: vk::DynamicState) -> bool {
     row(state).is_some() || LOOKED_UP.contains(&state)
 }
 
-/// Tells if a dynamic state is set by a value, which [`DynamicStates`] keeps.
+/// Reports whether a dynamic state has a value, which [`DynamicStates`] holds.
 pub(crate) fn has_value(state: vk::DynamicState) -> bool {
     row(state).is_some()
 }
 
-/// Tells if a Gaussian pipeline takes a state from the command buffer.
+/// Reports whether a Gaussian pipeline uses a state from the command buffer.
 pub(crate) fn is_taken_by_gaussians(state: vk::DynamicState) -> bool {
     row(state).is_some_and(|row| row.gaussians == Gaussians::Taken)
 }
 
-/// Tells if a Gaussian pipeline may have a state dynamic.
+/// Reports whether a state may be dynamic in a Gaussian pipeline.
 pub(crate) fn may_gaussians_have(state: vk::DynamicState) -> bool {
     row(state).map_or(LOOKED_UP[..5].contains(&state), |row| {
         row.gaussians != Gaussians::Refused
     })
 }
 
-/// The faces that a mask names.
+/// The faces of a mask.
 pub(crate) fn faces(mask: vk::StencilFaceFlags) -> impl Iterator<Item = Face> {
     let flags = [vk::StencilFaceFlags::FRONT, vk::StencilFaceFlags::BACK];
     (0..)
@@ -264,12 +264,12 @@ pub(crate) fn faces(mask: vk::StencilFaceFlags) -> impl Iterator<Item = Face> {
         .filter_map(move |(face, flag)| mask.contains(flag).then_some(face))
 }
 
-/// The states that a command buffer has set so far; the last value of each.
+/// The states that a command buffer has set so far, with the last value of each.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct DynamicStates(Vec<DynamicState>);
 
 impl DynamicStates {
-    /// Sets a state, instead of what was set before.
+    /// Sets a state, and replaces its earlier value.
     pub(crate) fn set(&mut self, state: DynamicState) {
         match self.0.iter_mut().find(|old| old.key() == state.key()) {
             Some(old) => *old = state,
@@ -277,15 +277,14 @@ impl DynamicStates {
         }
     }
 
-    /// The values that were set of a state: one, or one for each face.
+    /// The values of a state: one, or one for each face.
     fn of(&self, state: vk::DynamicState) -> impl Iterator<Item = DynamicState> {
         self.0.iter().copied().filter(move |it| it.key().0 == state)
     }
 
-    /// Makes those of the states `dynamic` that were set part of fixed-function state.
+    /// Puts the values of the states `dynamic` that are set into fixed-function state.
     ///
-    /// # Errors
-    /// The first state that was not set, though a draw needs it.
+    /// # Errors The first state that is not set but needed by the draw.
     pub(crate) fn apply(
         &self,
         dynamic: &[vk::DynamicState],
@@ -341,7 +340,7 @@ mod tests {
         let refused: Vec<_> = refused.collect();
         let expected = [S::PRIMITIVE_RESTART_ENABLE, S::RASTERIZER_DISCARD_ENABLE];
         assert_eq!(refused[..2], expected);
-        // All of VK_EXT_extended_dynamic_state3 and what comes with it.
+        // All states of VK_EXT_extended_dynamic_state3 and its additions.
         assert_eq!(refused.len(), 19);
     }
 }

@@ -9,7 +9,7 @@ use gaurast_spirv::{DescriptorKind, Interface, ShaderBinding, Stage};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// A pipeline's layout: what its programs may be bound to.
+/// A pipeline's layout: the resources that its programs may use.
 #[derive(Debug)]
 pub(crate) struct PipelineLayout {
     set_layouts: Vec<Option<Arc<DescriptorSetLayout>>>,
@@ -47,7 +47,7 @@ impl PipelineLayout {
         })
     }
 
-    /// The layout of set `set`.
+    /// The layout of set number `set`.
     ///
     /// # Errors
     /// [`Error::InvalidUsage`] if there is none.
@@ -61,7 +61,7 @@ impl PipelineLayout {
         })
     }
 
-    /// The most descriptors of a binding: what a descriptor array without a length may have.
+    /// The most descriptors of a binding: the greatest length of a descriptor array without one.
     pub(crate) fn longest_binding(&self) -> u32 {
         let bindings = self
             .set_layouts
@@ -75,10 +75,9 @@ impl PipelineLayout {
             .max(1)
     }
 
-    /// Checks that what a shader uses is there.
+    /// Checks that the layout has the resources that a shader uses.
     ///
-    /// # Errors
-    /// [`Error::InvalidUsage`] names all that is missing.
+    /// # Errors [`Error::InvalidUsage`] lists everything that is missing.
     pub(crate) fn check(&self, interface: &Interface) -> Result<(), Error> {
         let mismatches = self.mismatches(interface);
         if mismatches.is_empty() {
@@ -91,7 +90,7 @@ impl PipelineLayout {
         Err(Error::usage(vuid, mismatches.join("; ")))
     }
 
-    /// The disagreements of a shader with the layout.
+    /// The differences between a shader and the layout.
     pub(super) fn mismatches(&self, interface: &Interface) -> Vec<String> {
         let stage = interface.stage;
         let descriptors = interface.descriptors.iter();
@@ -109,7 +108,7 @@ impl PipelineLayout {
         found
     }
 
-    /// The disagreement of a shader's binding with the layout, if there is one.
+    /// The difference between a shader's binding and the layout, if there is one.
     fn descriptor_mismatch(&self, stage: Stage, wanted: &ShaderBinding) -> Option<String> {
         let set = self.set_layouts.get(wanted.set as usize);
         let set = set.and_then(Option::as_ref);
@@ -128,7 +127,7 @@ impl PipelineLayout {
                 "{place} of the pipeline layout isn't visible to the {stage} stage"
             ));
         }
-        // A combined descriptor may serve as either of its parts.
+        // A combined descriptor can be used as either of its parts.
         let is_part = given_kind == DescriptorKind::CombinedImageSampler
             && matches!(
                 wanted.kind,
@@ -148,7 +147,7 @@ impl PipelineLayout {
         })
     }
 
-    /// Tells if ranges that a stage sees cover all bytes.
+    /// Reports whether the ranges of a stage cover all bytes.
     fn has_push_constants(&self, stage: Stage, bytes: &Range<u32>) -> bool {
         let ranges = self.push_constants.iter();
         let mut visible: Vec<(u32, u32)> = ranges
@@ -174,7 +173,7 @@ fn stage_flag(stage: Stage) -> vk::ShaderStageFlags {
     }
 }
 
-/// The kind of a shader's variable that uses descriptors of a type.
+/// The kind of the shader variables that use descriptors of a type.
 fn kind(ty: vk::DescriptorType) -> Option<DescriptorKind> {
     match ty {
         vk::DescriptorType::SAMPLER => Some(DescriptorKind::Sampler),

@@ -1,8 +1,9 @@
-//! Linking: what a vertex and a fragment program exchange, with the device and with each other.
+//! Linking: the exchange of values between a vertex program, a fragment program and the device.
 //!
-//! Stages meet by location and component. A varying is carried only if the fragment program reads it: other outputs are
-//! taken off the vertex program, so that the device drops what computes them. What is read and never written is zero.
-//! Clip and cull distances that the fragment program reads are carried as varyings too.
+//! Stages are matched by location and component. A varying is passed on only if the fragment program reads it: other
+//! outputs are removed from the vertex program, so that the device drops the computations for them. A varying that is
+//! read but never written is zero. Clip and cull distances that the fragment program reads are passed on as varyings,
+//! too.
 
 use crate::abi::error::Error;
 use gaurast_spirv::{
@@ -16,14 +17,14 @@ use simdevice::program::interface::{
 };
 use std::collections::HashMap;
 
-/// The outputs of a pipeline's programs that have an effect, and what else of its state changes how they are linked.
+/// The outputs of a pipeline's programs that have an effect, and the other state that changes linking.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct LiveOutputs<'a> {
-    /// By colour attachment: whether anything is written to it, or made of its source's alpha.
+    /// By colour attachment: true if the attachment is written, or its source's alpha is used.
     pub(crate) color: &'a [bool],
     /// True if the second source of blending is read.
     pub(crate) second_source: bool,
-    /// True if points are drawn, so that their size matters.
+    /// True if points are drawn, so that the point size is used.
     pub(crate) points: bool,
     /// True if the pass has views, each of which is a layer.
     pub(crate) views: bool,
@@ -32,13 +33,13 @@ pub(crate) struct LiveOutputs<'a> {
 /// A location and a component of it.
 pub(crate) type InterfaceComponent = (u32, u32);
 
-/// The varyings by their place.
+/// The numbers of varyings, by location and component.
 pub(crate) type Varyings = HashMap<InterfaceComponent, u32>;
 
-/// Links programs. `stream` says in which attribute stream a vertex input's location is.
+/// Links programs. `stream` gives the attribute stream of a vertex input's location.
 ///
 /// # Errors
-/// [`Error::FeatureNotPresent`] if the stages exchange what the device cannot carry.
+/// [`Error::FeatureNotPresent`] if the device can't pass the values between the stages.
 pub(crate) fn link(
     mut vertex: Shader,
     mut fragment: Option<Shader>,
@@ -61,7 +62,7 @@ pub(crate) fn link(
     })
 }
 
-/// Links a vertex program that projects Gaussians: what it writes to `components` becomes the varyings of those numbers.
+/// Links a vertex program that projects Gaussians: its outputs `components` become varyings, in this order.
 ///
 /// # Errors
 /// As [`link`].
@@ -79,7 +80,8 @@ pub(crate) fn link_projection(
     })
 }
 
-/// Links a fragment program that makes colours of what Gaussians accumulate, of which `varyings` says the numbers.
+/// Links a fragment program that computes colours from the accumulated values of Gaussians. `varyings` gives their
+/// numbers.
 ///
 /// # Errors
 /// As [`link`].
@@ -181,7 +183,7 @@ fn check_widths(interface: &Interface) -> Result<(), Error> {
     Ok(())
 }
 
-/// The location, beyond all of applications, at which a distance is carried.
+/// The location, which no application can use, for a distance that is passed on as a varying.
 fn location_of_distance(built_in: BuiltIn) -> Option<u32> {
     match built_in {
         BuiltIn::ClipDistance => Some(u32::MAX),
@@ -190,8 +192,8 @@ fn location_of_distance(built_in: BuiltIn) -> Option<u32> {
     }
 }
 
-/// Makes varyings of the distances that the fragment program reads. The vertex program's outputs stay what they are and
-/// are written to varyings as well.
+/// Makes varyings of the distances that the fragment program reads. The vertex program's outputs are unchanged, and are
+/// written to varyings as well.
 fn carry_distances(vertex: &mut Shader, fragment: &mut Shader) {
     for input in &mut fragment.interface.inputs {
         let InputSource::BuiltIn {
@@ -240,7 +242,7 @@ fn carry_distances(vertex: &mut Shader, fragment: &mut Shader) {
     }
 }
 
-/// Numbers what the vertex stage writes and the fragment stage reads, in order of their components.
+/// Numbers the components that the vertex stage writes and the fragment stage reads, in order.
 fn varyings(vertex: &Interface, fragment: &Interface) -> Varyings {
     let mut components: Vec<InterfaceComponent> = components_read(fragment)
         .filter(|place| writes(vertex, *place))
@@ -272,7 +274,7 @@ fn components_read(interface: &Interface) -> impl Iterator<Item = InterfaceCompo
     })
 }
 
-/// Tells if a stage writes a component of a location.
+/// Reports whether a stage writes a component of a location.
 fn writes(interface: &Interface, place: InterfaceComponent) -> bool {
     interface.outputs.iter().any(|output| {
         matches!(output.target, OutputTarget::Location { location, component, .. }
@@ -280,7 +282,7 @@ fn writes(interface: &Interface, place: InterfaceComponent) -> bool {
     })
 }
 
-/// Makes constants of zero of the inputs that nothing is put into. (Slots are indices into `inputs`.)
+/// Replaces by a constant zero the inputs without a source. (Slots are indices into `inputs`.)
 fn zero_inputs<T>(program: &mut Program, inputs: &[Option<T>]) {
     let Program {
         inputs: registers,
@@ -299,7 +301,7 @@ fn zero_inputs<T>(program: &mut Program, inputs: &[Option<T>]) {
     });
 }
 
-/// Takes off the outputs that nobody reads.
+/// Removes outputs that are never read.
 fn drop_outputs<T>(program: &mut Program, outputs: &[Option<T>]) {
     program
         .outputs
@@ -323,7 +325,7 @@ fn vertex_input(input: &Input, stream: impl Fn(u32) -> Option<usize>) -> Option<
             BuiltIn::BaseInstance => Some(VertexInput::BaseInstance),
             BuiltIn::DrawIndex => Some(VertexInput::DrawIndex),
             BuiltIn::ViewIndex => Some(VertexInput::ViewIndex),
-            // There is one device, and its index is zero.
+            // A group has only one device, whose index is zero.
             _ => None,
         },
     }
@@ -394,7 +396,7 @@ fn fragment_input(input: &Input, varyings: &Varyings, views: bool) -> Option<Fra
                 BuiltIn::PrimitiveId => Some(FragmentInput::PrimitiveId),
                 BuiltIn::SampleId => Some(FragmentInput::SampleId),
                 BuiltIn::SamplePosition => Some(FragmentInput::SamplePosition(component)),
-                // There are fewer samples than bits of the first word.
+                // The samples of a pixel fit into the first word.
                 BuiltIn::SampleMask if component == 0 => Some(FragmentInput::SampleMask),
                 BuiltIn::Layer => Some(FragmentInput::Layer),
                 BuiltIn::ViewIndex if views => Some(FragmentInput::Layer),
@@ -474,7 +476,7 @@ mod tests {
         }
     }
 
-    /// A shader that gives its inputs to its outputs, and zero to what is left.
+    /// A shader that copies its inputs to its outputs; further outputs are zero.
     fn shader(stage: Stage, inputs: Vec<Input>, outputs: Vec<Output>) -> Shader {
         let mut builder = Builder::new();
         let read: Vec<_> = (0..inputs.len() as u32)
@@ -567,7 +569,7 @@ mod tests {
             })
         };
         assert_eq!(fragment.inputs, [varying(1), None, varying(0)]);
-        // What nobody writes is zero: a constant in the input's place.
+        // An input that is never written is replaced by a constant zero.
         assert_eq!(slots(&fragment.program), (vec![0, 2], vec![0, 2]));
         let color = |component| {
             Some(FragmentOutput::Color {

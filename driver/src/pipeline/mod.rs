@@ -1,6 +1,6 @@
-//! Pipelines: what draws and dispatches need of their create infos, converted and validated once.
+//! Pipelines: the parts of create infos that draws and dispatches use, converted and validated once.
 //!
-//! [`GraphicsState`] and [`ShaderStage`] follow the create infos' pointers; everything beyond is safe.
+//! [`GraphicsState`] and [`ShaderStage`] follow the create infos' pointers; all other code is safe.
 
 pub(crate) mod compute;
 pub(crate) mod dynamic_state;
@@ -33,22 +33,22 @@ use std::sync::Arc;
 /// A `VkPipeline`.
 #[derive(Debug)]
 pub(crate) enum Pipeline {
-    /// For draws.
+    /// A pipeline for draws.
     Graphics(Arc<GraphicsPipeline>),
-    /// For dispatches.
+    /// A pipeline for dispatches.
     Compute(Arc<ComputePipeline>),
 }
 
 /// A graphics pipeline.
 #[derive(Debug)]
 pub(crate) struct GraphicsPipeline {
-    /// The kind of what it draws, with its state.
+    /// The kind of the primitives, with the kind's state.
     pub(crate) kind: PipelineKind,
     /// True if vertex strides come from `vkCmdBindVertexBuffers2`.
     pub(crate) dynamic_stride: bool,
 }
 
-/// The kind of a graphics pipeline, by what it draws.
+/// The kind of a graphics pipeline, by its primitives.
 #[derive(Debug)]
 pub(crate) enum PipelineKind {
     /// Gaussians.
@@ -82,11 +82,11 @@ impl GraphicsPipeline {
     }
 }
 
-/// A pipeline cache. Pipelines are cheap to make, so it stays empty.
+/// A pipeline cache. Pipelines are cheap to create, so it stays empty.
 #[derive(Debug)]
 pub(crate) struct PipelineCache;
 
-/// Makes one pipeline.
+/// Creates one pipeline.
 ///
 /// # Safety
 /// The create info and its chain are valid.
@@ -103,7 +103,7 @@ unsafe fn new_graphics_pipeline(
     Ok(Pipeline::Graphics(Arc::new(pipeline)))
 }
 
-/// Makes one pipeline.
+/// Creates one pipeline.
 ///
 /// # Safety
 /// The create info and its chain are valid.
@@ -126,7 +126,7 @@ unsafe fn new_compute_pipeline(
     Ok(Pipeline::Compute(Arc::new(pipeline)))
 }
 
-/// An empty cache's data: `VkPipelineCacheHeaderVersionOne` and nothing more.
+/// An empty cache's data: `VkPipelineCacheHeaderVersionOne` and nothing else.
 fn cache_header() -> Vec<u8> {
     let properties = limits::properties();
     let mut header = Vec::with_capacity(32);
@@ -138,8 +138,8 @@ fn cache_header() -> Vec<u8> {
     header
 }
 
-/// Makes a pipeline of each create info. Vulkan lets the rest be skipped once one fails; their handles are null. Every
-/// pipeline is compiled when it is created, so that those which may not be are not created.
+/// Creates a pipeline for each create info. After a failure the rest is skipped, as Vulkan allows; their handles are
+/// null. Every pipeline needs compilation, so one with `FAIL_ON_PIPELINE_COMPILE_REQUIRED` is not created.
 fn create_each<T>(
     infos: &[T],
     pipelines: &mut [MaybeUninit<vk::Pipeline>],
@@ -163,7 +163,7 @@ fn create_each<T>(
     Ok(result)
 }
 
-/// Says of creation feedback that there is none: it takes no time that anybody would want to know.
+/// Marks creation feedback as invalid, since times are not measured.
 ///
 /// # Safety
 /// The create info's chain is valid.
@@ -234,7 +234,7 @@ pub(crate) unsafe fn get_pipeline_cache_data(
         return Ok(vk::Result::INCOMPLETE);
     }
     *data_size = header.len();
-    // SAFETY: the caller's promise; the data has room for the header.
+    // SAFETY: the caller's promise; the data has space for the header.
     unsafe { std::ptr::copy_nonoverlapping(header.as_ptr(), data.cast::<u8>(), header.len()) };
     Ok(vk::Result::SUCCESS)
 }

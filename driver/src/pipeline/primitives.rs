@@ -30,11 +30,11 @@ pub(crate) struct PrimitivePipeline {
     pub(crate) vertex_resources: ProgramResources,
     /// The resources that the fragment program is bound to.
     pub(crate) fragment_resources: ProgramResources,
-    /// The fixed-function state, as far as it is static.
+    /// The static fixed-function state.
     pub(crate) fixed: FixedFunctionState,
-    /// The state for the device, if nothing of it is dynamic.
+    /// The state for the device, if no state is dynamic.
     pub(crate) state: Option<Arc<DrawState>>,
-    /// The states that the command buffer sets, but for viewports and scissors.
+    /// The dynamic states, except for viewports and scissors.
     pub(crate) dynamic: Vec<vk::DynamicState>,
     /// The source of viewports.
     pub(crate) viewports: ViewportSource,
@@ -45,11 +45,11 @@ pub(crate) struct PrimitivePipeline {
 /// The source of viewports or scissors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ViewportSource {
-    /// The pipeline.
+    /// The pipeline sets them.
     Static,
-    /// The command buffer; this many.
+    /// The command buffer sets this number of them.
     Dynamic(u32),
-    /// The command buffer, which also says how many.
+    /// The command buffer sets them with their number.
     DynamicWithCount,
 }
 
@@ -126,7 +126,7 @@ impl PrimitivePipeline {
 /// The stages of a pipeline.
 struct Stages<'a> {
     vertex: &'a ShaderStage<'a>,
-    /// Absent if nothing is rasterized.
+    /// The fragment stage; None if nothing is rasterized.
     fragment: Option<&'a ShaderStage<'a>>,
 }
 
@@ -165,7 +165,7 @@ impl<'a> Stages<'a> {
     }
 }
 
-/// The states that are dynamic, and the sources of viewports and scissors.
+/// The dynamic states, and the sources of viewports and scissors.
 fn dynamic(
     info: &GraphicsState,
 ) -> Result<(Vec<vk::DynamicState>, ViewportSource, ViewportSource), Error> {

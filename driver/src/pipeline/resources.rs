@@ -1,18 +1,18 @@
-//! The resources that a pipeline's programs are bound to.
+//! The resources that a pipeline's programs use.
 
 use crate::device::Device;
 use crate::device_addresses::Addresses;
 use gaurast_spirv::{Interface, ShaderBinding};
 use std::sync::Arc;
 
-/// The resources that a program is bound to.
+/// The resources that a program uses.
 #[derive(Debug, Default)]
 pub(crate) struct ProgramResources {
     /// Its descriptors.
     pub(crate) descriptors: Vec<ShaderBinding>,
-    /// The buffers that it reaches by address, if it reaches any.
+    /// The buffers that it may access by address; None if it uses no addresses.
     pub(crate) addresses: Option<Arc<Addresses>>,
-    /// True if it writes to memory, so that it may write to what it reaches by address.
+    /// True if it writes to memory, and therefore may write through an address.
     pub(crate) writes: bool,
 }
 

@@ -41,10 +41,9 @@ pub(crate) fn translate(
     Ok(shader)
 }
 
-/// The sources that locations are read from.
+/// The sources of the attributes at locations.
 ///
-/// # Errors
-/// [`Error::InvalidUsage`] for a location that no attribute feeds, or one with numbers of another kind.
+/// # Errors [`Error::InvalidUsage`] for a location without an attribute, or with an attribute of another numeric type.
 pub(crate) fn attributes(
     info: &VertexInputState,
     locations: &[(u32, ScalarType)],
@@ -70,9 +69,9 @@ pub(crate) fn attributes(
     ))
 }
 
-/// The disagreement of what a shader reads at a location with the numbers of the attribute's format, if there is one.
+/// The difference between the type that a shader reads at a location and the attribute's format, if there is one.
 pub(super) fn type_mismatch(location: u32, wanted: ScalarType, format: Format) -> Option<String> {
-    // Normalised and scaled formats are floats.
+    // Normalised and scaled formats are read as floats.
     let given = match format.numeric() {
         Numeric::Uint => ScalarType::Uint { width: 32 },
         Numeric::Sint => ScalarType::Int { width: 32 },
@@ -85,7 +84,8 @@ pub(super) fn type_mismatch(location: u32, wanted: ScalarType, format: Format) -
     })
 }
 
-/// The class of a type, which a format and an input must have in common: the kind of number, and if it has 64 bits.
+/// The class of a type, which a format and an input must have in common: the kind of number, and true if it has 64
+/// bits.
 fn class(ty: ScalarType) -> (u8, bool) {
     match ty {
         ScalarType::Float { width } => (0, width == 64),
@@ -95,7 +95,7 @@ fn class(ty: ScalarType) -> (u8, bool) {
     }
 }
 
-/// Tells of inputs that the stage before doesn't write. They read as zero.
+/// Reports inputs that the stage before doesn't write. They read as zero.
 pub(crate) fn warn_of_unwritten(device: &Device, vertex: &Interface, fragment: &Interface) {
     for (location, component) in link::unwritten(vertex, fragment) {
         let message = format!(

@@ -1,5 +1,6 @@
-//! The state of graphics pipelines: create infos with their pointers followed, as far as Vulkan has them read; vertex input;
-//! and fixed-function state. What a switch governs is kept beside the switch, as either may be dynamic without the other.
+//! The state of graphics pipelines: create infos with their pointers followed, as far as Vulkan has them read; vertex
+//! input; and fixed-function state. The state that a switch enables is kept even if the switch is off, because either
+//! may be dynamic without the other.
 
 use super::layout::PipelineLayout;
 use crate::abi::error::Error;
@@ -21,8 +22,8 @@ use simdevice::state::{
 };
 use std::sync::Arc;
 
-/// The state of a graphics pipeline: a `VkGraphicsPipelineCreateInfo` with its pointers followed, in the four parts of a
-/// pipeline library. State that the application may leave out is empty, `None` or the default.
+/// The state of a graphics pipeline: a `VkGraphicsPipelineCreateInfo` with its pointers followed, in the four parts of
+/// a pipeline library. State that the application may omit is empty, `None` or the default.
 #[derive(Default)]
 pub(crate) struct GraphicsState<'a> {
     /// The vertex input interface.
@@ -43,12 +44,12 @@ pub(crate) struct GraphicsState<'a> {
     pub(crate) approximation: Option<PipelineGaussianApproximationStateCreateInfoGAURAST<'a>>,
 }
 
-/// The reading and assembly of vertices.
+/// The vertex input and input assembly state.
 #[derive(Default)]
 pub(crate) struct VertexInputState<'a> {
     /// Vertex bindings.
     pub(crate) bindings: &'a [vk::VertexInputBindingDescription],
-    /// The number of instances that an element lasts, of bindings that advance by instance and where that isn't one.
+    /// The instance divisors of bindings that advance by instance, if not 1.
     pub(crate) divisors: &'a [vk::VertexInputBindingDivisorDescriptionKHR],
     /// Vertex attributes.
     pub(crate) attributes: &'a [vk::VertexInputAttributeDescription],
@@ -58,19 +59,19 @@ pub(crate) struct VertexInputState<'a> {
     pub(crate) primitive_restart: bool,
 }
 
-/// Vertex bindings and attributes that a command buffer sets.
+/// Vertex bindings and attributes set by a command buffer.
 #[derive(Debug, Default)]
 pub(crate) struct VertexInput {
     /// Vertex bindings.
     pub(crate) bindings: Vec<vk::VertexInputBindingDescription>,
-    /// The number of instances that an element lasts, of bindings that advance by instance.
+    /// The instance divisors of bindings that advance by instance.
     pub(crate) divisors: Vec<vk::VertexInputBindingDivisorDescriptionKHR>,
     /// Vertex attributes.
     pub(crate) attributes: Vec<vk::VertexInputAttributeDescription>,
 }
 
 impl VertexInput {
-    /// They as a pipeline has them.
+    /// The bindings and attributes in the form of a pipeline's.
     pub(crate) fn state(&self) -> VertexInputState<'_> {
         VertexInputState {
             bindings: &self.bindings,
@@ -86,7 +87,7 @@ impl VertexInput {
 pub(crate) struct PreRasterizationState<'a> {
     /// The shader stages.
     pub(crate) stages: Vec<(vk::ShaderStageFlags, ShaderStage<'a>)>,
-    /// The number of viewports; one each is given unless they are dynamic.
+    /// The number of viewports. Unless they are dynamic, each has a value in `viewports`.
     pub(crate) viewport_count: u32,
     /// Viewports, unless dynamic.
     pub(crate) viewports: &'a [vk::Viewport],
@@ -96,46 +97,46 @@ pub(crate) struct PreRasterizationState<'a> {
     pub(crate) scissors: &'a [vk::Rect2D],
     /// Rasterization state.
     pub(crate) rasterization: vk::PipelineRasterizationStateCreateInfo<'a>,
-    /// True if a primitive's last vertex, not its first, is the provoking one.
+    /// True if the provoking vertex is a primitive's last, not its first.
     pub(crate) provoking_last: bool,
-    /// Whether primitives are clipped at the near and far planes, if the pipeline says so.
+    /// True if primitives are clipped at the near and far planes; None if the pipeline doesn't say.
     pub(crate) depth_clip: Option<bool>,
-    /// The mode in which lines are drawn.
+    /// The line rasterization state.
     pub(crate) lines: vk::PipelineRasterizationLineStateCreateInfoKHR<'a>,
 }
 
-/// The fragment stage, and the tests of depth and stencil.
+/// The fragment stage, and the depth and stencil tests.
 #[derive(Default)]
 pub(crate) struct FragmentShaderState<'a> {
-    /// The fragment stage; there may be none.
+    /// The fragment stage; empty if there is none.
     pub(crate) stages: Vec<(vk::ShaderStageFlags, ShaderStage<'a>)>,
     /// Depth and stencil state, if the subpass has such an attachment.
     pub(crate) depth_stencil: Option<vk::PipelineDepthStencilStateCreateInfo<'a>>,
 }
 
-/// Samples, attachments, and how fragments are blended into them.
+/// Multisampling, attachments, and blending.
 #[derive(Default)]
 pub(crate) struct FragmentOutputState<'a> {
     /// Multisample state.
     pub(crate) multisample: vk::PipelineMultisampleStateCreateInfo<'a>,
-    /// The samples that may be covered.
+    /// The mask of samples that can be covered.
     pub(crate) sample_mask: u32,
-    /// The logic operation, and whether it is enabled.
+    /// The logic operation, and true if it is enabled.
     pub(crate) logic_op: (vk::LogicOp, bool),
-    /// Blend state by colour attachment; none where all of it is dynamic.
+    /// Blend state by colour attachment; empty if all of it is dynamic.
     pub(crate) blend: &'a [vk::PipelineColorBlendAttachmentState],
-    /// Colour attachments that are written at all, if the pipeline says so.
+    /// Colour write enables by attachment; empty if the pipeline has none.
     pub(crate) color_write_enables: &'a [vk::Bool32],
     /// Blend constants.
     pub(crate) blend_constants: [f32; 4],
-    /// The colour formats of the subpass; undefined where the attachment is unused.
+    /// The colour formats of the subpass; undefined if the attachment is unused.
     pub(crate) color_formats: Vec<vk::Format>,
-    /// The views that draws are for, a bit each; 0 without views.
+    /// The views that draws render to, a bit each; 0 without views.
     pub(crate) view_mask: u32,
 }
 
 impl<'a> GraphicsState<'a> {
-    /// Follows a create info's pointers. Those that the rest of the create info makes meaningless may point anywhere.
+    /// Follows a create info's pointers. Pointers that the rest of the create info makes irrelevant may be invalid.
     ///
     /// # Safety
     /// The create info and its chain are valid.
@@ -206,12 +207,12 @@ impl<'a> GraphicsState<'a> {
         before.iter().chain(fragment)
     }
 
-    /// Tells if a state is dynamic.
+    /// Reports whether a state is dynamic.
     pub(crate) fn is_dynamic(&self, state: vk::DynamicState) -> bool {
         self.dynamic.contains(&state)
     }
 
-    /// Tells if nothing is ever rasterized, so that all state of rasterization is left out.
+    /// Reports whether nothing is ever rasterized, so that all rasterization state is ignored.
     pub(crate) fn discards(&self) -> bool {
         self.pre_rasterization
             .rasterization
@@ -220,7 +221,7 @@ impl<'a> GraphicsState<'a> {
             && !self.is_dynamic(vk::DynamicState::RASTERIZER_DISCARD_ENABLE)
     }
 
-    /// Tells if all that colour attachments have of their own is dynamic, so that the pipeline has nothing of it.
+    /// Reports whether all state of single colour attachments is dynamic, so that the pipeline has none of it.
     fn has_dynamic_blending(&self) -> bool {
         use vk::DynamicState as S;
         [
@@ -232,7 +233,7 @@ impl<'a> GraphicsState<'a> {
         .all(|state| self.is_dynamic(state))
     }
 
-    /// Fails if an index is to restart a list, which takes the feature `primitiveTopologyListRestart`.
+    /// Fails if primitive restart is enabled for a list, which needs the feature `primitiveTopologyListRestart`.
     ///
     /// # Errors
     /// [`Error::InvalidUsage`].
@@ -252,7 +253,7 @@ impl<'a> GraphicsState<'a> {
         ))
     }
 
-    /// The width of lines. Pipelines that draw none often leave it at zero.
+    /// The line width. It is often left at zero in pipelines that draw no lines.
     fn line_width(&self) -> f32 {
         let width = self.pre_rasterization.rasterization.line_width;
         if width == 0.0 || self.is_dynamic(vk::DynamicState::LINE_WIDTH) {
@@ -293,7 +294,7 @@ unsafe fn read_vertex_input<'a>(
     Ok(())
 }
 
-/// The state of pipelines that rasterize.
+/// Reads the state of pipelines that rasterize.
 ///
 /// # Safety
 /// The create info and its chain are valid.
@@ -343,7 +344,7 @@ unsafe fn read_fragments<'a>(
     Ok(())
 }
 
-/// Viewports and scissors; their pointers may be anything where they are dynamic.
+/// Reads viewports and scissors. The pointers may be invalid if these are dynamic.
 ///
 /// # Safety
 /// The state is valid.
@@ -374,15 +375,15 @@ unsafe fn read_viewports<'a>(
 /// The attachments that a pipeline renders to.
 #[derive(Default)]
 struct AttachmentFormats {
-    /// By colour attachment; undefined where unused.
+    /// The formats by colour attachment; undefined if unused.
     color: Vec<vk::Format>,
     /// True if there is a depth or stencil attachment.
     has_depth_stencil: bool,
-    /// The views that draws are for, a bit each; 0 without views.
+    /// The views that draws render to, a bit each; 0 without views.
     view_mask: u32,
 }
 
-/// The formats of the subpass, or of dynamic rendering, that a pipeline is for.
+/// The formats of the subpass, or of dynamic rendering, in which a pipeline draws.
 ///
 /// # Safety
 /// The create info and its chain are valid.
@@ -424,7 +425,7 @@ unsafe fn attachment_formats(
     }
 }
 
-/// The source that a pipeline reads an attribute from.
+/// The source of an attribute.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct AttributeSource {
     /// The vertex buffer binding.
@@ -433,16 +434,15 @@ pub(crate) struct AttributeSource {
     pub(crate) stride: u32,
     /// Bytes from the vertex's start to the attribute.
     pub(crate) offset: u32,
-    /// The format that it is stored in.
+    /// The format in memory.
     pub(crate) format: Format,
-    /// After how many instances it advances (0: never), `None` if it advances by vertex.
+    /// The number of instances after which it advances (0: never); `None` if it advances by vertex.
     pub(crate) instance_divisor: Option<u32>,
 }
 
-/// Finds the attribute at `location`, which the extension calls `name` and needs `components` of.
+/// Finds the attribute at `location`, which the extension calls `name` and for which it needs `components`.
 ///
-/// # Errors
-/// An [`Error`] if the location, its binding or its format won't do.
+/// # Errors An [`Error`] if the location, its binding or its format is unsuitable.
 pub(crate) fn attribute(
     info: &GraphicsState,
     name: &str,
@@ -473,7 +473,7 @@ pub(crate) fn attribute(
 /// Finds the attribute at `location`.
 ///
 /// # Errors
-/// The fault of an attribute, as the end of a sentence about its location.
+/// The problem with the attribute, as the end of a sentence about its location.
 pub(crate) fn source(info: &VertexInputState, location: u32) -> Result<AttributeSource, String> {
     let attribute = info.attributes.iter().find(|a| a.location == location);
     let attribute = attribute.ok_or("which the vertex input state does not have")?;
@@ -507,13 +507,13 @@ pub(crate) fn source(info: &VertexInputState, location: u32) -> Result<Attribute
     })
 }
 
-/// State that each colour attachment has of its own.
+/// The state of a single colour attachment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct AttachmentState {
-    /// Blending, if it is on, of colour and alpha.
+    /// True if blending is enabled.
     pub(super) blend_enable: bool,
     pub(super) equations: BlendEquations,
-    /// The components that are written, a bit each, if any are.
+    /// The components that are written, a bit each, if writes are enabled.
     pub(super) write_mask: u8,
     pub(super) write_enable: bool,
 }
@@ -521,7 +521,7 @@ pub(crate) struct AttachmentState {
 /// The equations of colour and alpha.
 pub(crate) type BlendEquations = (BlendEquation, BlendEquation);
 
-/// The equation that takes the source.
+/// The equation that gives the source.
 const REPLACE: BlendEquation = BlendEquation {
     source: BlendFactor::One,
     destination: BlendFactor::Zero,
@@ -529,7 +529,7 @@ const REPLACE: BlendEquation = BlendEquation {
 };
 
 impl AttachmentState {
-    /// What is written as it is.
+    /// The state that writes the source unchanged.
     const WRITTEN: Self = Self {
         blend_enable: false,
         equations: (REPLACE, REPLACE),
@@ -552,8 +552,7 @@ impl AttachmentState {
 
 /// The state of all colour attachments.
 ///
-/// # Errors
-/// An [`Error`] if there are not as many as attachments, or for what the device lacks.
+/// # Errors An [`Error`] if their number is not that of the attachments, or for state that the device doesn't support.
 fn attachment_states(info: &GraphicsState) -> Result<Vec<AttachmentState>, Error> {
     let enables = info.fragment_output.color_write_enables;
     let with_enables = |index: usize, state: AttachmentState| AttachmentState {
@@ -584,7 +583,7 @@ fn attachment_states(info: &GraphicsState) -> Result<Vec<AttachmentState>, Error
                 write_mask: convert::write_mask(given.color_write_mask),
                 ..AttachmentState::WRITTEN
             };
-            // What isn't used may hold anything.
+            // An unused value may be anything.
             let may_blend =
                 blend_enable || info.is_dynamic(vk::DynamicState::COLOR_BLEND_ENABLE_EXT);
             if may_blend && !info.is_dynamic(vk::DynamicState::COLOR_BLEND_EQUATION_EXT) {
@@ -595,7 +594,7 @@ fn attachment_states(info: &GraphicsState) -> Result<Vec<AttachmentState>, Error
         .collect()
 }
 
-/// Tells if an attachment is blended with the second source of the fragment stage.
+/// Reports whether blending of an attachment reads the second source of the fragment stage.
 pub(crate) fn reads_second_source(state: &vk::PipelineColorBlendAttachmentState) -> bool {
     use vk::BlendFactor as F;
     let factors = [
@@ -613,7 +612,7 @@ pub(crate) fn reads_second_source(state: &vk::PipelineColorBlendAttachmentState)
     state.blend_enable != vk::FALSE && factors.into_iter().any(is_second)
 }
 
-/// A feature of the device: if it works, and its name.
+/// A feature of the device: true if it is supported, and its name.
 macro_rules! supported {
     ($feature:ident) => {
         (SUPPORTED.$feature, stringify!($feature))
@@ -623,7 +622,7 @@ macro_rules! supported {
 /// The state of a pipeline, or of a draw.
 #[derive(Clone, Debug)]
 pub(crate) struct FixedFunctionState {
-    /// All but depth bias, depth, stencil, logic operations and what colour attachments have of their own.
+    /// All state except depth bias, depth, stencil, logic operations and the state of single colour attachments.
     pub(crate) draw: DrawState,
     pub(super) depth_bias_enable: bool,
     pub(super) depth_bias: DepthBias,
@@ -634,7 +633,7 @@ pub(crate) struct FixedFunctionState {
     pub(super) depth_bounds: (f32, f32),
     pub(super) stencil_test: bool,
     pub(super) stencil: [StencilFace; 2],
-    /// State of Gaussians, if the pipeline draws them.
+    /// The state of Gaussians, if the pipeline draws them.
     pub(super) gaussian: Option<Box<GaussianState>>,
     pub(super) logic_op_enable: bool,
     pub(super) logic_op: LogicOp,
@@ -676,12 +675,11 @@ impl FixedFunctionState {
         Ok(state)
     }
 
-    /// As [`FixedFunctionState::new`], of Gaussians: what becomes of their fragments.
+    /// As [`FixedFunctionState::new`], for the fragments of Gaussians.
     ///
-    /// # Errors
-    /// As there.
+    /// # Errors As there.
     pub(crate) fn of_gaussians(info: &GraphicsState) -> Result<Self, Error> {
-        // Nothing comes of the topology.
+        // The topology has no effect.
         let mut state = Self::of(info, Topology::TriangleStrip)?;
         if !info
             .fragment_output
@@ -696,7 +694,7 @@ impl FixedFunctionState {
         Ok(state)
     }
 
-    /// Vertex assembly and rasterization; the rest such that it does nothing.
+    /// The state with vertex assembly and rasterization of the pipeline; all other state has no effect.
     fn of(info: &GraphicsState, topology: Topology) -> Result<Self, Error> {
         let raster = &info.pre_rasterization.rasterization;
         let polygon_mode = convert::polygon_mode(raster.polygon_mode)?;
@@ -886,7 +884,7 @@ impl FixedFunctionState {
         let draw = &mut self.draw;
         draw.samples = count;
         draw.sample_mask = info.fragment_output.sample_mask;
-        // The device shades either once or every sample, and as many as are asked for is at least.
+        // The device shades a pixel once or at every sample, and the requested number is a minimum.
         let shaded = (multisample.min_sample_shading * count as f32).ceil();
         draw.sample_shading = multisample.sample_shading_enable != vk::FALSE && shaded > 1.0;
         draw.alpha_to_coverage = multisample.alpha_to_coverage_enable != vk::FALSE;
@@ -908,7 +906,7 @@ impl FixedFunctionState {
         self.depth_write = state.depth_write_enable != vk::FALSE;
         self.depth_bounds_test = bounds_test;
         self.depth_bounds = (state.min_depth_bounds, state.max_depth_bounds);
-        // What isn't used may hold anything.
+        // An unused value may be anything.
         let may_test = |enabled, state| enabled || info.is_dynamic(state);
         let tests_depth = may_test(self.depth_test, vk::DynamicState::DEPTH_TEST_ENABLE);
         if tests_depth && !info.is_dynamic(vk::DynamicState::DEPTH_COMPARE_OP) {
@@ -942,7 +940,7 @@ impl FixedFunctionState {
         let (op, enable) = info.fragment_output.logic_op;
         require_all(&[(enable, supported!(logic_op), "logicOpEnable")])?;
         self.logic_op_enable = enable;
-        // What isn't used may hold anything.
+        // An unused value may be anything.
         let may_operate = enable || info.is_dynamic(vk::DynamicState::LOGIC_OP_ENABLE_EXT);
         if may_operate && !info.is_dynamic(vk::DynamicState::LOGIC_OP_EXT) {
             self.logic_op = convert::logic_op(op)?;
@@ -963,12 +961,12 @@ impl FixedFunctionState {
         self.draw.front_clockwise = face == vk::FrontFace::CLOCKWISE;
     }
 
-    /// Tells if anything is rasterized.
+    /// Reports whether anything is rasterized.
     pub(super) fn rasterizes(&self) -> bool {
         !self.draw.rasterizer_discard
     }
 
-    /// Tells if lines are drawn, so that their width matters.
+    /// Reports whether lines are drawn, so that their width is used.
     pub(super) fn draws_lines(&self) -> bool {
         let draw = &self.draw;
         let are_lines =
@@ -976,42 +974,42 @@ impl FixedFunctionState {
         self.rasterizes() && are_lines
     }
 
-    /// Tells if fragments' depths are biased.
+    /// Reports whether depth bias is enabled.
     pub(super) fn biases_depth(&self) -> bool {
         self.rasterizes() && self.depth_bias_enable
     }
 
-    /// Tells if the attachment's depths are tested against bounds.
+    /// Reports whether the depth bounds test is enabled.
     pub(super) fn tests_depth_bounds(&self) -> bool {
         self.rasterizes() && self.depth_bounds_test
     }
 
-    /// Tells if depths are tested.
+    /// Reports whether the depth test is enabled.
     pub(super) fn tests_depth(&self) -> bool {
         self.rasterizes() && self.depth_test
     }
 
-    /// Tells if stencil values are tested.
+    /// Reports whether the stencil test is enabled.
     pub(super) fn tests_stencil(&self) -> bool {
         self.rasterizes() && self.stencil_test
     }
 
-    /// Tells if an attachment is blended by the constants.
+    /// Reports whether an attachment's blending uses the blend constants.
     pub(super) fn blends_by_constants(&self) -> bool {
         self.rasterizes() && !self.logic_op_enable && blends_by_constants(&self.attachments)
     }
 
-    /// Tells if a logic operation replaces blending.
+    /// Reports whether a logic operation replaces blending.
     pub(super) fn operates(&self) -> bool {
         self.rasterizes() && self.logic_op_enable
     }
 
-    /// Tells if there are colour attachments that fragments are written to.
+    /// Reports whether fragments are written to a colour attachment.
     pub(super) fn has_colors(&self) -> bool {
         self.rasterizes() && !self.attachments.is_empty()
     }
 
-    /// Tells if a colour attachment is blended.
+    /// Reports whether a colour attachment is blended.
     pub(super) fn blends(&self) -> bool {
         self.rasterizes()
             && self
@@ -1020,26 +1018,26 @@ impl FixedFunctionState {
                 .any(|attachment| attachment.blend_enable)
     }
 
-    /// Changes what a colour attachment has of its own, if there is such a one.
+    /// Changes the state of a colour attachment, if it exists.
     pub(super) fn set_attachment(&mut self, index: usize, set: impl FnOnce(&mut AttachmentState)) {
         if let Some(attachment) = self.attachments.get_mut(index) {
             set(attachment);
         }
     }
 
-    /// Tells if Gaussians are drawn.
+    /// Reports whether Gaussians are drawn.
     pub(super) fn draws_gaussians(&self) -> bool {
         self.gaussian.is_some()
     }
 
-    /// Changes what Gaussians are drawn by, if any are.
+    /// Changes the state of Gaussians, if any are drawn.
     pub(super) fn set_gaussian(&mut self, set: impl FnOnce(&mut GaussianState)) {
         if let Some(state) = &mut self.gaussian {
             set(state);
         }
     }
 
-    /// State of Gaussians, with the rest of the state that they take.
+    /// The state of Gaussians, combined with the rest of the state that they use.
     pub(crate) fn gaussian_state(&self) -> GaussianState {
         let converted = self.draw_state();
         GaussianState {
@@ -1068,7 +1066,7 @@ impl FixedFunctionState {
     }
 }
 
-/// Tells if an attachment is blended by the constants.
+/// Reports whether an attachment's blending uses the blend constants.
 fn blends_by_constants(attachments: &[AttachmentState]) -> bool {
     let blended = attachments
         .iter()
@@ -1105,7 +1103,7 @@ pub(crate) enum Class {
     Triangles,
 }
 
-/// A topology's class, which a dynamic topology stays in.
+/// The class of a topology. A dynamic topology must stay in its class.
 pub(crate) fn class(topology: Topology) -> Class {
     match topology {
         Topology::PointList => Class::Points,
@@ -1121,7 +1119,7 @@ pub(crate) fn class(topology: Topology) -> Class {
     }
 }
 
-/// Fails for the first need whose feature the device lacks.
+/// Fails for the first required feature that the device lacks.
 fn require_all(needs: &[(bool, (bool, &str), &str)]) -> Result<(), Error> {
     let lacks = |needed: bool, is_supported: bool| needed && !is_supported;
     match needs
@@ -1135,9 +1133,9 @@ fn require_all(needs: &[(bool, (bool, &str), &str)]) -> Result<(), Error> {
     }
 }
 
-/// For each colour attachment, whether anything comes of its source.
+/// True for each colour attachment whose source has an effect.
 pub(crate) fn live_color_outputs(info: &GraphicsState, fixed: &FixedFunctionState) -> Vec<bool> {
-    // What is dynamic may be on.
+    // Dynamic state may be enabled.
     let any_mask = info.is_dynamic(vk::DynamicState::COLOR_WRITE_MASK_EXT);
     let mut live_outputs: Vec<_> =
         std::iter::zip(&fixed.attachments, &info.fragment_output.color_formats)

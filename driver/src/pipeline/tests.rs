@@ -1,4 +1,4 @@
-//! Shaders are compared with the pipeline's layout, its vertex attributes and the stage before.
+//! Tests that shaders are compared with the pipeline's layout, its vertex attributes and the stage before.
 
 use super::layout::PipelineLayout;
 use super::{link, stages};
@@ -9,7 +9,7 @@ use simdevice::Format;
 use std::path::Path;
 use std::sync::Arc;
 
-/// The interface of a shader that is kept for the tests of the translation.
+/// The interface of a checked-in shader of the shader compiler's tests.
 fn interface(name: &str, stage: Stage) -> Interface {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("spirv/tests/shaders");
     let bytes = std::fs::read(folder.join(format!("{name}.spv"))).unwrap();
@@ -23,7 +23,7 @@ fn interface(name: &str, stage: Stage) -> Interface {
     shader.interface
 }
 
-/// A binding that all stages see.
+/// A binding that all stages can access.
 fn binding(number: u32, kind: vk::DescriptorType, count: u32) -> BindingInfo {
     BindingInfo {
         number,

@@ -14,7 +14,7 @@ use simdevice::packet::BufferRange;
 use simdevice::{Allocation, Format};
 use std::sync::{Arc, OnceLock};
 
-/// Every buffer's offset in memory must be a multiple of this. It is a cache line, and as much as any texel needs.
+/// The alignment of every buffer in memory: a cache line, which suffices for any texel.
 pub(crate) const ALIGNMENT: u64 = 64;
 
 /// A buffer.
@@ -22,9 +22,9 @@ pub(crate) const ALIGNMENT: u64 = 64;
 pub(crate) struct Buffer {
     size: u64,
     memory: OnceLock<(Arc<Allocation>, u64)>,
-    /// The device's addresses, if the buffer is to have one.
+    /// The device's addresses, if the buffer needs one.
     addresses: Option<Arc<Addresses>>,
-    /// Its address, once it is bound.
+    /// Its address, if it is bound and needs one.
     address: OnceLock<u64>,
 }
 
@@ -33,23 +33,23 @@ objects! {
     vk::BufferView => BufferView;
 }
 
-/// The ids of the rules that a use of a buffer may break.
+/// The ids of the rules on a use of a buffer.
 #[derive(Debug)]
 pub(crate) struct BufferRules {
     /// The buffer must be bound to memory.
     pub(crate) memory: &'static str,
-    /// The buffer must have the bytes that are used.
+    /// The buffer must have the used bytes.
     pub(crate) range: &'static str,
 }
 
-/// The rules on the buffer of a view.
+/// The rules on the buffer of a buffer view.
 const VIEWED: BufferRules = BufferRules {
     memory: "VUID-VkBufferViewCreateInfo-buffer-00935",
     range: "VUID-VkBufferViewCreateInfo-offset-00931",
 };
 
 impl Buffer {
-    /// A buffer of `size` bytes, not yet bound to memory. With `addresses` it will have one of those.
+    /// A buffer of `size` bytes, not yet bound to memory. With `addresses`, it gets one of them when it is bound.
     pub(crate) fn new(size: u64, addresses: Option<Arc<Addresses>>) -> Self {
         Self {
             size,
@@ -62,7 +62,7 @@ impl Buffer {
     /// The address of its first byte.
     ///
     /// # Errors
-    /// [`Error::InvalidUsage`] if it is not bound, or was not made to have an address.
+    /// [`Error::InvalidUsage`] if it is not bound, or was not created with a device address.
     fn address(&self) -> Result<vk::DeviceAddress, Error> {
         self.address.get().copied().ok_or_else(|| {
             Error::usage(
@@ -106,10 +106,9 @@ impl Buffer {
         Ok(())
     }
 
-    /// The bytes from `offset` on: `size` of them, or with `None` (`VK_WHOLE_SIZE`) all that follow.
+    /// `size` bytes from `offset` on; with `None` (`VK_WHOLE_SIZE`) all bytes from there on.
     ///
-    /// # Errors
-    /// [`Error::InvalidUsage`] if the buffer is not bound or has no such bytes.
+    /// # Errors [`Error::InvalidUsage`] if the buffer is not bound or does not have these bytes.
     pub(crate) fn range(
         &self,
         offset: u64,
@@ -140,7 +139,7 @@ impl Buffer {
         }
     }
 
-    /// All of the buffer.
+    /// All bytes of the buffer.
     ///
     /// # Errors
     /// [`Error::InvalidUsage`] if the buffer is not bound.
@@ -160,7 +159,7 @@ impl Drop for Buffer {
 /// The requirements of a resource of `size` bytes.
 pub(crate) fn requirements(size: u64) -> vk::MemoryRequirements {
     vk::MemoryRequirements {
-        // No memory has room for what cannot be rounded up.
+        // A size that can't be rounded up doesn't fit any memory.
         size: size.checked_next_multiple_of(ALIGNMENT).unwrap_or(u64::MAX),
         alignment: ALIGNMENT,
         memory_type_bits: ALL_TYPE_BITS,
@@ -172,7 +171,7 @@ pub(crate) fn requirements(size: u64) -> vk::MemoryRequirements {
 pub(crate) struct BufferView {
     /// The bytes.
     pub(crate) range: BufferRange,
-    /// The format of texels in them.
+    /// The format of its texels.
     pub(crate) format: Format,
 }
 
@@ -197,7 +196,7 @@ pub(crate) fn fits(
     ))
 }
 
-/// The buffer that a create info asks for.
+/// The buffer of a create info.
 fn new_buffer(
     info: &vk::BufferCreateInfo<'_>,
     external: Option<&vk::ExternalMemoryBufferCreateInfo<'_>>,
@@ -231,7 +230,7 @@ fn new_buffer(
     ))
 }
 
-/// Writes requirements and, where asked for, that no dedicated allocation is wanted.
+/// Writes the requirements and, if the chain asks, that no dedicated allocation is preferred.
 pub(crate) fn fill_requirements(
     mut out: OutputChain<'_, vk::MemoryRequirements2<'_>>,
     requirements: vk::MemoryRequirements,
@@ -260,7 +259,7 @@ pub(crate) fn get_buffer_device_address(buffer: &Buffer) -> Result<vk::DeviceAdd
     buffer.address()
 }
 
-/// What an address is asked for by in a capture is the address; none is replayed.
+/// Returns the buffer's address, as its opaque capture address. Captured addresses are not replayed.
 #[doc(alias = "vkGetBufferOpaqueCaptureAddress")]
 pub(crate) fn get_buffer_opaque_capture_address(buffer: &Buffer) -> Result<u64, Error> {
     buffer.address()

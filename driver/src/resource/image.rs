@@ -17,7 +17,7 @@ use std::sync::{Arc, OnceLock};
 /// An image.
 #[derive(Debug)]
 pub(crate) struct Image {
-    /// Its shape.
+    /// Its description.
     pub(crate) desc: ImageDesc,
     size: u64,
     bound: OnceLock<Arc<image::Image>>,
@@ -99,17 +99,17 @@ impl Image {
 /// An image view.
 #[derive(Debug)]
 pub(crate) struct ImageView {
-    /// The device's half.
+    /// The device's image view.
     pub(crate) view: image::ImageView,
     /// The aspect that shaders read.
     pub(crate) aspect: Aspect,
-    /// The order in which shaders see components.
+    /// The component mapping for shaders.
     pub(crate) swizzle: Swizzle,
 }
 
 impl ImageView {
-    /// A view of `range` of a bound image, read as `format`. A view of a 3D image as an array of 2D ones has its slices
-    /// for layers; it is rendered to, and nothing else.
+    /// A view of `range` of a bound image, read as `format`. In a view of a 3D image as an array of 2D ones, slices are
+    /// layers; it can only be rendered to.
     ///
     /// # Errors
     /// [`Error::InvalidUsage`] if the image is not bound or does not have the range, or the formats are not compatible.
@@ -168,7 +168,7 @@ impl ImageView {
     }
 }
 
-/// The number of `available` things that a range from `base` on has, if it has any and all exist.
+/// The number of elements in a range from `base` on, out of `available`. None if it is zero or one doesn't exist.
 pub(crate) fn count(base: u32, count: u32, remaining: u32, available: u32) -> Option<u32> {
     let rest = available.checked_sub(base)?;
     let count = if count == remaining { rest } else { count };
@@ -179,10 +179,10 @@ fn unsupported_format(format: vk::Format) -> Error {
     Error::FormatNotSupported(format!("{format:?} is not supported for images"))
 }
 
-/// The image that a create info asks for, not yet bound to memory.
+/// The image of a create info, not yet bound to memory.
 ///
 /// # Errors
-/// [`Error::FormatNotSupported`] or [`Error::InvalidUsage`] if there can be no such image.
+/// [`Error::FormatNotSupported`] or [`Error::InvalidUsage`] if such an image is not supported.
 pub(crate) fn new_image(
     info: &vk::ImageCreateInfo<'_>,
     external: Option<&vk::ExternalMemoryImageCreateInfo<'_>>,
@@ -195,7 +195,7 @@ pub(crate) fn new_image(
         format: info.format,
         ty: info.image_type,
         tiling: info.tiling,
-        // The stencil aspect may be used otherwise than the depth.
+        // The stencil aspect may have another usage than depth.
         usage: info.usage | stencil.map_or_else(Default::default, |it| it.stencil_usage),
         flags: info.flags,
     })?;
@@ -273,14 +273,14 @@ pub(crate) fn get_device_image_memory_requirements(
     fill_requirements(memory_requirements, image.requirements())
 }
 
-/// No image is sparse.
+/// Returns nothing: no image is sparse.
 #[doc(alias = "vkGetImageSparseMemoryRequirements")]
 pub(crate) fn get_image_sparse_memory_requirements()
 -> Result<[vk::SparseImageMemoryRequirements; 0], Error> {
     Ok([])
 }
 
-/// No image is sparse.
+/// Returns nothing: no image is sparse.
 #[doc(alias = "vkGetImageSparseMemoryRequirements2")]
 #[doc(alias = "vkGetDeviceImageSparseMemoryRequirements")]
 pub(crate) fn get_image_sparse_memory_requirements2(

@@ -10,7 +10,7 @@ use std::ffi::c_void;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// A `VkDeviceMemory`. Resources bound to it share its allocation, which lives as long as any of them.
+/// A `VkDeviceMemory`. Resources bound to it share its allocation, which exists as long as any of them.
 #[derive(Debug)]
 pub(crate) struct Memory {
     allocation: Arc<Allocation>,
@@ -24,7 +24,7 @@ impl Memory {
     /// Allocates `size` zeroed bytes of `heap`.
     ///
     /// # Errors
-    /// [`Error::OutOfDeviceMemory`] if the heap or the host has no more.
+    /// [`Error::OutOfDeviceMemory`] if the heap or the host has not enough.
     pub(crate) fn new(heap: &Arc<Heap>, size: u64, host_visible: bool) -> Result<Self, Error> {
         if size == 0 {
             return Err(Error::usage(
@@ -44,16 +44,15 @@ impl Memory {
         })
     }
 
-    /// The memory itself.
+    /// The allocation.
     pub(crate) fn allocation(&self) -> &Arc<Allocation> {
         &self.allocation
     }
 
-    /// Maps `size` bytes from `offset` on; `None` is all that follow.
+    /// Maps `size` bytes from `offset` on; with `None`, all bytes from there on.
     ///
-    /// # Errors
-    /// [`Error::MemoryMapFailed`] if it is not host-visible, [`Error::InvalidUsage`] if it is mapped already or the range
-    /// does not lie in it.
+    /// # Errors [`Error::MemoryMapFailed`] if it is not host-visible, [`Error::InvalidUsage`] if it is mapped already
+    /// or the range exceeds it.
     pub(crate) fn map(&self, offset: u64, size: Option<u64>) -> Result<*mut u8, Error> {
         if !self.allocation.is_host_visible() {
             return Err(Error::MemoryMapFailed(
@@ -129,7 +128,7 @@ pub(crate) fn unmap_memory(memory: &Memory) -> Result<(), Error> {
     Ok(())
 }
 
-/// All host-visible memory is coherent.
+/// Does nothing but check the handles: all host-visible memory is coherent.
 ///
 /// # Safety
 /// The ranges' handles are live.
@@ -144,13 +143,13 @@ pub(crate) unsafe fn flush_mapped_memory_ranges(
     })
 }
 
-/// Memory itself has no address, only the buffers that are bound to it, so that nothing of it is captured.
+/// Returns zero: memory has no address, only the buffers bound to it have.
 #[doc(alias = "vkGetDeviceMemoryOpaqueCaptureAddress")]
 pub(crate) fn get_device_memory_opaque_capture_address() -> Result<u64, Error> {
     Ok(0)
 }
 
-/// No memory type is lazily allocated, so what is committed is all of it.
+/// Returns the size of the memory: no memory type is lazily allocated.
 #[doc(alias = "vkGetDeviceMemoryCommitment")]
 pub(crate) fn get_device_memory_commitment(memory: &Memory) -> Result<vk::DeviceSize, Error> {
     Ok(memory.allocation().len())

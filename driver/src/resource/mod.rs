@@ -1,4 +1,4 @@
-//! Resources: memory, and what is bound to it, with its views.
+//! Resources: memory, buffers, images, samplers, and views.
 
 pub(crate) mod buffer;
 pub(crate) mod image;

@@ -12,18 +12,17 @@ use std::sync::Arc;
 /// A sampler.
 #[derive(Debug)]
 pub(crate) struct Sampler {
-    /// The device's half.
+    /// The device's sampler.
     pub(crate) state: texture::Sampler,
 }
 
 objects! { vk::Sampler => Sampler; }
 
 impl Sampler {
-    /// A sampler as its create info and what is chained to it ask for.
+    /// A sampler from its create info and the structures in its chain.
     ///
-    /// # Errors
-    /// [`Error::FeatureNotPresent`] for filters, modes and colours of extensions; [`Error::InvalidUsage`] for a comparison
-    /// that is none.
+    /// # Errors [`Error::FeatureNotPresent`] for filters, modes and colours of extensions; [`Error::InvalidUsage`] for
+    /// an unknown comparison.
     pub(crate) fn new(
         info: &vk::SamplerCreateInfo<'_>,
         reduction: Option<vk::SamplerReductionMode>,

@@ -1,9 +1,9 @@
-//! What goes wrong with a window system.
+//! Errors of window systems.
 
 use driver::window::WindowLost;
 use std::fmt::Display;
 
-/// An error of a window system's as the loss of its window.
+/// Converts an error of a window system to the loss of its window.
 pub(crate) fn lost(error: impl Display) -> WindowLost {
     WindowLost(error.to_string())
 }

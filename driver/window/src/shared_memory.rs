@@ -1,4 +1,4 @@
-//! Memory that a server of a window system maps too.
+//! Memory that is shared with the server of a window system.
 
 use crate::error::lost;
 use driver::window::WindowLost;
@@ -14,10 +14,9 @@ pub(crate) struct SharedMemory {
 }
 
 impl SharedMemory {
-    /// `size` bytes, which are zero.
+    /// Creates `size` bytes, which are zero.
     ///
-    /// # Errors
-    /// [`WindowLost`] if there is no such memory.
+    /// # Errors [`WindowLost`] if the system can't provide them.
     pub(crate) fn new(size: usize) -> Result<Self, WindowLost> {
         let file = memfd_create("gaurast-picture", MemfdFlags::CLOEXEC).map_err(lost)?;
         ftruncate(&file, size as u64).map_err(lost)?;
@@ -37,10 +36,9 @@ impl SharedMemory {
         self.file.as_fd()
     }
 
-    /// As [`SharedMemory::descriptor`], for a receiver who closes it.
+    /// A copy of its file descriptor, for a receiver that closes it.
     ///
-    /// # Errors
-    /// [`WindowLost`] if the process has no more descriptors.
+    /// # Errors [`WindowLost`] if the process has no descriptors left.
     pub(crate) fn own_descriptor(&self) -> Result<OwnedFd, WindowLost> {
         self.descriptor().try_clone_to_owned().map_err(lost)
     }

@@ -1,7 +1,7 @@
-//! Surfaces of Wayland: pictures are buffers of memory that the compositor shares (`wl_shm`).
+//! Surfaces of Wayland: pictures are buffers of memory that is shared with the compositor (`wl_shm`).
 //!
-//! The connection is the application's. The driver has an event queue of its own on it, so that it hears of its own objects
-//! only, and the application of its own.
+//! The connection is the application's. The driver has an event queue of its own on it, so that each of the two
+//! receives only events of its own objects.
 
 use crate::error::lost;
 use crate::shared_memory::SharedMemory;
@@ -21,14 +21,14 @@ use wayland_client::protocol::wl_shm_pool::WlShmPool;
 use wayland_client::protocol::wl_surface::WlSurface;
 use wayland_client::{Connection, Dispatch, EventQueue, Proxy, QueueHandle, delegate_noop};
 
-/// The longest wait for a compositor to want a picture. It wants none while a window is hidden, and an application that waits
-/// for one of its images should go on then, if slowly.
+/// The longest wait for a compositor to ask for a picture. It asks for none while a window is hidden, and an
+/// application that waits for one of its images should then continue, if slowly.
 const LONGEST_FRAME: Duration = Duration::from_millis(250);
 
-/// The number of buffers: one that is shown, one that is to be shown, and one that is written.
+/// The number of buffers: one that is shown, one that waits, and one that is written.
 const BUFFERS: usize = 3;
 
-/// The version of `wl_surface` from which on damage is told in pixels of the buffer.
+/// The first version of `wl_surface` in which damage is given in pixels of the buffer.
 const DAMAGE_BUFFER_SINCE: u32 = 4;
 
 /// The window system of `VK_KHR_wayland_surface`.
@@ -119,12 +119,12 @@ impl Window for WaylandWindow {
     }
 }
 
-/// The things that the compositor has told.
+/// The state reported by the compositor's events.
 #[derive(Default)]
 struct Events {
-    /// The compositor has not yet asked for the picture after the last.
+    /// True if the compositor has not yet asked for the next picture.
     is_waiting: bool,
-    /// Buffers that the compositor reads.
+    /// True for buffers that the compositor is reading.
     is_busy: [bool; BUFFERS],
 }
 
@@ -177,7 +177,7 @@ delegate_noop!(Events: WlShmPool);
 struct WaylandCanvas {
     connection: Connection,
     surface: WlSurface,
-    /// A picture's bytes.
+    /// The size of a picture in bytes.
     size: usize,
     /// Width and height of pictures.
     extent: [i32; 2],
@@ -185,12 +185,12 @@ struct WaylandCanvas {
     buffers: [WlBuffer; BUFFERS],
     queue: EventQueue<Events>,
     events: Events,
-    /// When the last picture was shown.
+    /// The time at which the last picture was shown.
     shown: Instant,
 }
 
 impl WaylandCanvas {
-    /// Hears of events until `is_over`, at most for `longest`; tells if it is.
+    /// Dispatches events until `is_over`, at most for `longest`. Returns true if it is.
     fn listen(
         &mut self,
         longest: Duration,
@@ -209,7 +209,7 @@ impl WaylandCanvas {
                 return Ok(false);
             }
             self.queue.flush().map_err(lost)?;
-            // Without a guard there are events that are not dispatched yet.
+            // If there is no guard, some events are not dispatched yet.
             let Some(guard) = self.queue.prepare_read() else {
                 continue;
             };
@@ -239,7 +239,7 @@ impl Canvas for WaylandCanvas {
         let is_free = |events: &Events| events.is_busy.contains(&false);
         self.listen(LONGEST_FRAME, is_free)?;
         self.shown = Instant::now();
-        // Where the compositor reads all of them, this picture is left out.
+        // If the compositor is reading all buffers, this picture is skipped.
         let Some(index) = self.events.is_busy.iter().position(|&is_busy| !is_busy) else {
             return Ok(());
         };
@@ -258,7 +258,7 @@ impl Canvas for WaylandCanvas {
         }
         self.surface.commit();
         self.connection.flush().or_else(|error| match error {
-            // The socket is full: what is left goes with the next flush.
+            // The socket is full: the rest is sent by the next flush.
             wayland_backend::client::WaylandError::Io(error)
                 if error.kind() == std::io::ErrorKind::WouldBlock =>
             {
@@ -274,7 +274,7 @@ impl Drop for WaylandCanvas {
         for buffer in &self.buffers {
             buffer.destroy();
         }
-        // Nothing is lost if the compositor is gone.
+        // It doesn't matter if the compositor is gone.
         let _ = self.connection.flush();
     }
 }

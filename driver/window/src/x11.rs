@@ -1,9 +1,9 @@
-//! Windows of X11: pictures are put to them through memory that the server shares (MIT-SHM), or through the connection
-//! where it does not share any, as over a network.
+//! Windows of X11: pictures are put to them through memory that is shared with the server (MIT-SHM), or through the
+//! connection if the server shares none, as over a network.
 //!
-//! The connection is the application's: requests go over it on any thread, as libxcb allows, and none of them leaves an event
-//! or an error in its queue. So the display's refresh cannot be heard of; it is taken from RandR, and a clock paces pictures
-//! by it.
+//! The connection is the application's: requests are sent on any thread, as libxcb allows, and none of them leaves an
+//! event or an error in the application's queue. So the driver can't receive the display's refreshes. It reads their
+//! period from RandR, and paces pictures with a clock.
 
 use crate::error::lost;
 use crate::shared_memory::SharedMemory;
@@ -22,7 +22,7 @@ use x11rb::protocol::shm::{self, ConnectionExt as _};
 use x11rb::protocol::xproto::{ConnectionExt as _, CreateGCAux, ImageFormat, ImageOrder};
 use x11rb::xcb_ffi::XCBConnection;
 
-/// The period of a display that does not tell its own: 60 Hz.
+/// The period assumed for a display that reports none: 60 Hz.
 const USUAL_PERIOD: Duration = Duration::from_nanos(16_666_667);
 
 /// The window system of `VK_KHR_xcb_surface`.
@@ -66,7 +66,7 @@ impl WindowSystem for Xlib {
     }
 }
 
-/// The connection of libxcb that is beneath a display of Xlib.
+/// The libxcb connection of an Xlib display.
 ///
 /// # Safety
 /// The pointer is an open `Display`.
@@ -83,7 +83,7 @@ unsafe fn connection_of_display(display: NonNull<c_void>) -> Result<NonNull<c_vo
     NonNull::new(connection).ok_or_else(|| lost("the display has no connection"))
 }
 
-/// Fails if a connection is broken already.
+/// Fails if a connection is already broken.
 ///
 /// # Safety
 /// The pointer is an `xcb_connection_t`.
@@ -111,13 +111,13 @@ struct X11Window {
     connection: Arc<XCBConnection>,
     window: u32,
     depth: u8,
-    /// The time from one refresh of the display to the next.
+    /// The time between refreshes of the display.
     period: Duration,
 }
 
 impl X11Window {
-    /// # Safety
-    /// The connection is an `xcb_connection_t` and stays open until the window, and all made of it, are dropped.
+    /// # Safety The connection is an `xcb_connection_t` and stays open until the window, and everything made of it, are
+    /// dropped.
     unsafe fn open(connection: NonNull<c_void>, window: u32) -> Result<Self, WindowLost> {
         // SAFETY: the caller's promise.
         let connection = unsafe {
@@ -148,7 +148,7 @@ impl X11Window {
     }
 }
 
-/// The time from one refresh to the next of the fastest display of a screen; `None` where the server knows none.
+/// The period of the fastest display of a screen; `None` if the server knows none.
 fn refresh_period(connection: &XCBConnection, root: u32) -> Option<Duration> {
     connection
         .extension_information(randr::X11_EXTENSION_NAME)
@@ -173,7 +173,7 @@ fn refresh_period(connection: &XCBConnection, root: u32) -> Option<Duration> {
             }
             Some(f64::from(mode.htotal) * lines / f64::from(mode.dot_clock))
         })
-        // What is not between 10 and 1000 Hz is no display's.
+        // A rate that is not between 10 and 1000 Hz is wrong.
         .filter(|seconds| (0.001..0.1).contains(seconds))
         .min_by(f64::total_cmp)?;
     Some(Duration::from_secs_f64(seconds))
@@ -228,15 +228,15 @@ impl Window for X11Window {
     }
 }
 
-/// The pixels of a picture on their way to the server.
+/// The pixels of a picture that is sent to the server.
 enum Pixels {
-    /// The server reads them where they are.
+    /// The server reads them from shared memory.
     Shared(Segment),
-    /// They go over the connection.
+    /// They are sent over the connection.
     Sent(Vec<u8>),
 }
 
-/// Memory that the server maps.
+/// Memory that is shared with the server.
 struct Segment {
     memory: SharedMemory,
     id: u32,
@@ -247,7 +247,7 @@ impl Segment {
     fn new(connection: &XCBConnection, size: usize) -> Option<Self> {
         // SAFETY: the connection is open, and so is its socket.
         let socket = unsafe { BorrowedFd::borrow_raw(connection.as_raw_fd()) };
-        // Descriptors are sent over sockets of this machine only; to try it over another breaks the connection.
+        // Descriptors can be sent only over local sockets; on another the attempt breaks the connection.
         let address = rustix::net::getsockname(socket).ok()?;
         if address.address_family() != rustix::net::AddressFamily::UNIX {
             return None;
@@ -269,7 +269,7 @@ impl Segment {
     }
 }
 
-/// A window's place for pictures.
+/// A window prepared for pictures.
 struct X11Canvas {
     connection: Arc<XCBConnection>,
     window: u32,
@@ -278,20 +278,20 @@ struct X11Canvas {
     context: u32,
     /// Width and height of pictures.
     size: [u16; 2],
-    /// Alpha is of no account, but the window has one.
+    /// True if the pictures are opaque but the window has alpha.
     is_opaque: bool,
     pixels: Pixels,
     period: Duration,
-    /// The next refresh of the display.
+    /// The time of the display's next refresh.
     next: Instant,
 }
 
 impl X11Canvas {
-    /// Sends the server a picture's rows, in requests as large as it takes.
+    /// Sends a picture's rows to the server, in requests as large as it accepts.
     fn send(&self, pixels: &[u8]) -> Result<(), WindowLost> {
         let [width, height] = self.size;
         let row_size = 4 * usize::from(width);
-        // A request's own words go with each.
+        // A request has a header of its own.
         let room = self.connection.maximum_request_bytes().saturating_sub(64);
         let rows = (room / row_size).clamp(1, usize::from(height));
         let mut y = 0;
@@ -331,7 +331,7 @@ impl Canvas for X11Canvas {
     }
 
     fn show(&mut self, copy: &mut dyn FnMut(&mut [u8])) -> Result<(), WindowLost> {
-        // A late picture is shown at once, and those after it follow from then on.
+        // A late picture is shown at once, and later ones are paced from then on.
         self.next = (self.next + self.period).max(Instant::now());
         let pixels = match &mut self.pixels {
             Pixels::Shared(segment) => segment.memory.bytes(),
@@ -364,7 +364,7 @@ impl Canvas for X11Canvas {
                         0,
                     )
                     .map_err(lost)?;
-                // The server has read it when it answers, so that the next may be written.
+                // The server has read the picture when it answers, so the next one may be written.
                 put.check().map_err(lost)
             }
             Pixels::Sent(pixels) => self.send(pixels),
@@ -382,7 +382,7 @@ impl Drop for X11Canvas {
         if let Ok(freed) = self.connection.free_gc(self.context) {
             freed.ignore_error();
         }
-        // Nothing is lost if the server is gone.
+        // It doesn't matter if the server is gone.
         let _ = self.connection.flush();
     }
 }

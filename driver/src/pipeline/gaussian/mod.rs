@@ -30,13 +30,13 @@ use std::sync::Arc;
 /// The Gaussian part of a pipeline.
 #[derive(Debug)]
 pub(crate) struct GaussianPipeline {
-    /// The state for the device; what is dynamic of it is filled in for each draw.
+    /// The state for the device; its dynamic parts are filled in for each draw.
     pub(crate) state: Arc<GaussianState>,
-    /// The state that decides what becomes of fragments, as far as it is static.
+    /// The static state of fragment operations.
     pub(crate) fixed: FixedFunctionState,
-    /// The states that the command buffer sets of that.
+    /// The dynamic states of fragment operations.
     pub(crate) dynamic: Vec<vk::DynamicState>,
-    /// The limits and features that their values must keep to.
+    /// The limits and features for the values of these states.
     pub(crate) dynamic_rules: DynamicRules,
     /// The viewport, unless it is dynamic.
     pub(crate) viewport: Option<Viewport>,
@@ -44,13 +44,13 @@ pub(crate) struct GaussianPipeline {
     pub(crate) scissor: Option<Rect>,
     /// The source of draws' cameras.
     pub(crate) camera: CameraSource,
-    /// The views of the passes that it draws in, a bit each; none if they have none.
+    /// The views of the passes in which it draws, a bit each; 0 without views.
     pub(crate) view_mask: u32,
     /// The models that the camera may have.
     pub(crate) camera_models: CameraModels,
     /// The source of Gaussians.
     pub(crate) source: GaussianSource,
-    /// The stage that makes colours of what they accumulate.
+    /// The stage that computes colours from accumulated values.
     pub(crate) resolve: Option<ResolveStage>,
 }
 
@@ -76,11 +76,11 @@ pub(crate) struct GaussianAttributeSources {
     pub(crate) opacity: AttributeSource,
     /// The sources of the spherical harmonics' coefficients.
     pub(crate) spherical_harmonics: HarmonicsSource,
-    /// The functions that are applied to scales and opacities.
+    /// The activation functions of scales and opacities.
     pub(crate) activations: Activations,
-    /// The sources of the rows of model matrices, if there are any.
+    /// The sources of the rows of model matrices, if it has them.
     pub(crate) model_matrix: Option<[AttributeSource; 3]>,
-    /// The source of factors of the opacity, if there are any.
+    /// The source of opacity factors, if it has one.
     pub(crate) model_opacity: Option<AttributeSource>,
 }
 
@@ -96,7 +96,7 @@ pub(crate) enum HarmonicsSource {
 /// The source of Gaussian draws' cameras.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum CameraSource {
-    /// There is none: a vertex shader projects.
+    /// No camera: a vertex shader projects.
     None,
     /// `vkCmdSetGaussianCamerasGAURAST`.
     Command,
@@ -104,9 +104,9 @@ pub(crate) enum CameraSource {
     UniformBuffer {
         /// The descriptor set.
         set: u32,
-        /// The binding, whose first descriptor it is.
+        /// The binding, of which the first descriptor is used.
         binding: u32,
-        /// Cameras in the buffer.
+        /// The number of cameras in the buffer.
         count: u32,
     },
 }
@@ -120,7 +120,7 @@ pub(crate) struct CameraModels {
 }
 
 impl CameraModels {
-    /// The models of a device.
+    /// The enabled models of a device.
     pub(crate) fn of(features: &Features) -> Self {
         Self {
             orthographic: features.orthographic_camera,
@@ -129,7 +129,7 @@ impl CameraModels {
         }
     }
 
-    /// Tells if a camera of this model may be used.
+    /// Reports whether a camera of this model may be used.
     pub(crate) fn have(self, model: CameraModel) -> bool {
         match model {
             CameraModel::Pinhole => true,
@@ -170,7 +170,7 @@ impl GaussianPipeline {
         let mut fragments = FixedFunctionState::of_gaussians(info)?;
         let taken = info.dynamic.iter().copied();
         let taken = taken.filter(|&state| {
-            // What a vertex shader projects has no harmonics.
+            // Gaussians that a vertex shader projects have no harmonics.
             let is_ignored = vk::DynamicState::GAUSSIAN_SPHERICAL_HARMONICS_DEGREE == state;
             is_taken_by_gaussians(state) && !(is_shaded(gaussian) && is_ignored)
         });
@@ -272,7 +272,7 @@ fn source(
     }))
 }
 
-/// The state's first element, unless it is dynamic.
+/// The first element of a static state; None if the state is dynamic.
 fn fixed<T: Copy>(name: &str, dynamic: bool, values: &[T]) -> Result<Option<T>, Error> {
     match (dynamic, values.first()) {
         (true, _) => Ok(None),
@@ -296,7 +296,7 @@ fn state(
             GaussianPrecisionGAURAST::FLOAT16 => GaussianPrecision::Float16,
             _ => GaussianPrecision::Float32,
         },
-        // What a vertex shader projects has neither.
+        // Gaussians that a vertex shader projects have neither.
         geometry: match gaussian.geometry {
             GaussianGeometryGAURAST::GAUSSIAN_2D if !is_shaded(gaussian) => {
                 GaussianGeometry::Surfel
@@ -381,7 +381,7 @@ fn camera_source(
     })
 }
 
-/// Tells if a binding is a uniform buffer that the vertex stage sees.
+/// Reports whether a binding is a uniform buffer that the vertex stage can access.
 fn holds_camera(binding: &LayoutBinding) -> bool {
     let is_uniform = matches!(
         binding.kind,

@@ -34,7 +34,7 @@ pub(crate) struct VertexProjection {
 }
 
 impl VertexProjection {
-    /// Translates the vertex stage, and checks what it reads and writes.
+    /// Translates the vertex stage, and checks its inputs and outputs.
     ///
     /// # Errors
     /// An [`Error`] that names the valid usage broken, or the feature that the device lacks.
@@ -49,7 +49,7 @@ impl VertexProjection {
                 "projectionMode is VERTEX_SHADER, and there is no vertex stage",
             )
         })?;
-        // Nothing of a vertex stage depends on samples.
+        // A vertex stage doesn't depend on samples.
         let vertex = stages::translate(device, layout(info)?, stage, Stage::Vertex, 1)?;
         let components = components(state, &vertex.interface)?;
         let locations = vertex.interface.locations_read();
@@ -74,16 +74,16 @@ pub(crate) struct ResolveStage {
     pub(crate) program: Arc<GaussianFragmentProgram>,
     /// The resources that it is bound to.
     pub(crate) resources: ProgramResources,
-    /// True if every sample is shaded for itself.
+    /// True if every sample is shaded separately.
     pub(crate) sample_shading: bool,
-    /// True if alpha makes coverage.
+    /// True if alpha determines coverage.
     pub(crate) alpha_to_coverage: bool,
-    /// True if alpha becomes 1 after that.
+    /// True if alpha is then replaced by 1.
     pub(crate) alpha_to_one: bool,
 }
 
 impl ResolveStage {
-    /// Translates the fragment stage, if there is one, and checks what it reads and writes.
+    /// Translates the fragment stage, if there is one, and checks its inputs and outputs.
     ///
     /// # Errors
     /// An [`Error`] that names the valid usage broken, or the feature that the device lacks.
@@ -124,7 +124,7 @@ impl ResolveStage {
 }
 
 impl ResolveStage {
-    /// One that leaves colours as they are, so that their alpha may become coverage, or one.
+    /// A stage that leaves colours unchanged, so that alpha can determine coverage or be replaced by 1.
     fn passing(device: &Device, fixed: &FixedFunctionState) -> Result<Self, Error> {
         let mut builder = Builder::new();
         for slot in 0..4 {
@@ -169,7 +169,7 @@ impl ResolveStage {
 
 const RESOLVE_INPUTS: &str = "VUID-VkGaussianResolveInputLocationsGAURAST-None-90023";
 
-/// The numbers of what a resolve shader may read, by place.
+/// The varyings that a resolve shader may read, by location and component.
 fn varyings(state: &PipelineGaussianStateCreateInfoGAURAST) -> Result<Varyings, Error> {
     let locations = &state.resolve_input_locations;
     let (color, depth) = (locations.accumulated_color, locations.depth);
@@ -189,7 +189,7 @@ fn varyings(state: &PipelineGaussianStateCreateInfoGAURAST) -> Result<Varyings, 
     Ok(accumulated.chain(depths).collect())
 }
 
-/// Refuses what a resolve shader cannot read or write.
+/// Refuses inputs and outputs that a resolve shader can't have.
 fn check_resolve(interface: &Interface, varyings: &Varyings) -> Result<(), Error> {
     for input in &interface.inputs {
         let InputSource::Location {
@@ -241,7 +241,7 @@ fn find<'a>(info: &'a GraphicsState, wanted: vk::ShaderStageFlags) -> Option<&'a
     Some(stage)
 }
 
-/// The locations to which the vertex shader writes what the device takes, in the order of the numbers of [`gaussian`].
+/// The locations to which the vertex shader writes the device's inputs, in the order of the numbers of [`gaussian`].
 fn components(
     state: &PipelineGaussianStateCreateInfoGAURAST,
     interface: &Interface,

@@ -1,4 +1,4 @@
-//! The rules of a Gaussian pipeline's state, each with its id, and the features that its modes need.
+//! The rules of a Gaussian pipeline's state, each with its id, and the features that its modes require.
 
 use super::values;
 use crate::abi::error::Error;
@@ -18,7 +18,7 @@ use std::ops::Range;
 
 pub(super) const STRUCTURE: &str = "VkPipelineGaussianStateCreateInfoGAURAST";
 
-/// A feature bit of the extension: its value, its name, and the id of the rule that asks for it.
+/// A feature of the extension: its value, its name, and the id of the rule that requires it.
 pub(super) type Feature = (fn(&Features) -> bool, &'static str, &'static str);
 
 pub(super) const TOPOLOGY: Feature = (
@@ -119,7 +119,7 @@ pub(super) const DYNAMIC_STATE: Feature = (
     "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianDynamicState-90048",
 );
 
-/// Refuses `what` unless its feature is enabled, which one that the device lacks never is.
+/// Refuses `what` unless its feature is enabled. A feature that the device lacks can't be enabled.
 pub(super) fn require(features: &Features, feature: Feature, what: &str) -> Result<(), Error> {
     if feature.0(features) {
         return Ok(());
@@ -146,12 +146,12 @@ pub(super) fn has_fragment_stage(info: &GraphicsState) -> bool {
     stages.any(|(stage, _)| *stage == vk::ShaderStageFlags::FRAGMENT)
 }
 
-/// Tells if a vertex shader projects, so that what fixed-function projection is told is ignored.
+/// Reports whether a vertex shader projects, so that the state of fixed-function projection is ignored.
 pub(super) fn is_shaded(gaussian: &PipelineGaussianStateCreateInfoGAURAST) -> bool {
     gaussian.projection_mode == GaussianProjectionModeGAURAST::VERTEX_SHADER
 }
 
-/// The modes of a pipeline that do not all go together.
+/// The modes of a pipeline that can't all be combined.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Modes {
     order: GaussianOrder,
@@ -160,11 +160,11 @@ pub(super) struct Modes {
     is_flat: bool,
     is_half: bool,
     is_linearized: bool,
-    /// There are model matrices.
+    /// True if there are model matrices.
     is_placed: bool,
-    /// The vertex shader writes what is sorted by.
+    /// True if the vertex shader writes the sort key.
     has_key: bool,
-    /// The fragment stage reads depths.
+    /// True if the fragment stage reads depths.
     reads_depth: bool,
 }
 
@@ -175,7 +175,7 @@ impl Modes {
     ) -> Self {
         let is_used = |location: u32| location != GAUSSIAN_LOCATION_UNUSED_GAURAST;
         Self {
-            // What is no value is refused where it is converted.
+            // An invalid value is refused where it is converted.
             order: values::order(gaussian.order).unwrap_or(GaussianOrder::ViewDepth),
             is_compensated: values::is_compensated(gaussian.antialiasing).unwrap_or(false),
             is_shaded: is_shaded(gaussian),
@@ -189,7 +189,7 @@ impl Modes {
         }
     }
 
-    /// Refuses modes that mean nothing together.
+    /// Refuses combinations of modes that have no meaning.
     pub(super) fn check(&self) -> Result<(), Error> {
         let per_pixel = self.order == GaussianOrder::PerPixel;
         let by_distance = self.order == GaussianOrder::RadialDistance;
@@ -240,12 +240,12 @@ impl Modes {
     }
 }
 
-/// Limits and features that the values of dynamic states must keep to when a draw executes.
+/// The limits and features for the values of dynamic states when a draw executes.
 #[derive(Debug)]
 pub(crate) struct DynamicRules {
     modes: Modes,
     features: Box<Features>,
-    /// The degree whose coefficients are there.
+    /// The greatest degree for which the pipeline has coefficients.
     max_degree: u32,
 }
 
@@ -284,7 +284,7 @@ impl DynamicRules {
     }
 }
 
-/// Refuses the modes that may be dynamic unless their features are enabled.
+/// Refuses modes whose features are not enabled, among those that may be dynamic.
 pub(super) fn require_modes(features: &Features, state: &GaussianState) -> Result<(), Error> {
     if state.opacity_compensated {
         let what = "antialiasing is OPACITY_COMPENSATED";
@@ -315,7 +315,7 @@ fn ceiling_over_floor(floor: f32, ceiling: f32) -> Result<(), Error> {
     ))
 }
 
-/// A create info whose members that dynamic states stand in for are such that no rule is broken by them.
+/// The create info with the members of dynamic states replaced by values that break no rule.
 pub(super) fn without_dynamic<'a>(
     info: &GraphicsState,
     gaussian: &PipelineGaussianStateCreateInfoGAURAST<'a>,
@@ -402,7 +402,7 @@ pub(super) fn stages(
     Ok(())
 }
 
-/// Checks what fixed-function projection alone is told.
+/// Checks the state that only fixed-function projection uses.
 fn projection(
     gaussian: &PipelineGaussianStateCreateInfoGAURAST,
     features: &Features,
@@ -449,7 +449,7 @@ pub(super) fn modes(
     Ok(())
 }
 
-/// Refuses attributes that share a location: what was left zero names location 0.
+/// Refuses attributes that share a location. A location that was left zero is location 0.
 pub(super) fn distinct_locations(
     locations: &GaussianAttributeLocationsGAURAST,
     coefficients: u32,
@@ -489,7 +489,7 @@ pub(super) fn distinct_locations(
     Ok(())
 }
 
-/// Refuses numbers out of their ranges.
+/// Refuses numbers outside their ranges.
 pub(super) fn numbers(gaussian: &PipelineGaussianStateCreateInfoGAURAST) -> Result<(), Error> {
     let g = gaussian;
     let degree = g.spherical_harmonics_degree;
@@ -521,7 +521,7 @@ pub(super) fn numbers(gaussian: &PipelineGaussianStateCreateInfoGAURAST) -> Resu
     )
 }
 
-/// Refuses what a Gaussian pipeline cannot do yet in the ordinary fixed-function state.
+/// Refuses fixed-function state that a Gaussian pipeline doesn't support.
 pub(super) fn fixed_state(info: &GraphicsState, features: &Features) -> Result<(), Error> {
     use vk::DynamicState as S;
     let depth_stencil = info.fragment_shader.depth_stencil.unwrap_or_default();
@@ -591,7 +591,8 @@ pub(super) fn fixed_state(info: &GraphicsState, features: &Features) -> Result<(
     Ok(())
 }
 
-/// Validates and converts the chain's structure of approximations, if it has one, as far as it is not dynamic.
+/// Validates and converts the structure of approximations in the chain, if there is one, except for its dynamic
+/// members.
 pub(super) fn approximation(info: &GraphicsState) -> Result<GaussianApproximation, Error> {
     use vk::DynamicState as S;
     let given = info.approximation.unwrap_or_default();

@@ -1,10 +1,10 @@
-//! The values of a Gaussian pipeline's state that a command may set in its place: their conversion, and their rules.
+//! The values of a Gaussian pipeline's state that a command may set, too: their conversion, and their rules.
 
 use crate::abi::error::Error;
 use gaurast::vk::{GaussianAntialiasingGAURAST, GaussianOrderGAURAST};
 use simdevice::state::gaussian::GaussianOrder;
 
-/// The order of a value, if it is one.
+/// The order of a value; None if the value is unknown.
 pub(crate) fn order(value: GaussianOrderGAURAST) -> Option<GaussianOrder> {
     match value {
         GaussianOrderGAURAST::VIEW_DEPTH => Some(GaussianOrder::ViewDepth),
@@ -15,7 +15,7 @@ pub(crate) fn order(value: GaussianOrderGAURAST) -> Option<GaussianOrder> {
     }
 }
 
-/// Tells if opacity makes up for the low-pass filter; `None` if the value is no such mode.
+/// True if opacity compensates for the low-pass filter; `None` if the value is unknown.
 pub(crate) fn is_compensated(value: GaussianAntialiasingGAURAST) -> Option<bool> {
     match value {
         GaussianAntialiasingGAURAST::DILATE => Some(false),
@@ -24,11 +24,11 @@ pub(crate) fn is_compensated(value: GaussianAntialiasingGAURAST) -> Option<bool>
     }
 }
 
-/// The rule of a number.
+/// The rule of a number's range.
 pub(crate) struct Rule {
     name: &'static str,
     holds: fn(f32) -> bool,
-    /// The end of the sentence that says it.
+    /// The end of the message: the range in words.
     must_be: &'static str,
 }
 
@@ -65,7 +65,7 @@ pub(crate) const CONTRIBUTION_BUDGET: Rule = Rule {
 };
 
 impl Rule {
-    /// Refuses a value that breaks it.
+    /// Refuses a value that breaks the rule.
     ///
     /// # Errors
     /// [`Error::InvalidUsage`] with the id `vuid`.
