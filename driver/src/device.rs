@@ -167,8 +167,8 @@ impl Drop for Device {
 /// The features that the application asks `vkCreateDevice` to enable, with `extensions`.
 ///
 /// # Errors
-/// [`Error::FeatureNotPresent`] names the first feature that isn't supported, [`Error::InvalidUsage`] one whose extension
-/// isn't enabled.
+/// [`Error::FeatureNotPresent`] names the first feature that isn't supported, [`Error::InvalidUsage`] one whose
+/// extension isn't enabled.
 ///
 /// # Safety
 /// The creation info is valid.

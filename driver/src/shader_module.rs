@@ -32,8 +32,8 @@ impl ShaderModule {
     /// Keeps a copy of SPIR-V.
     ///
     /// # Errors
-    /// [`Error::InvalidUsage`] if it isn't SPIR-V in the host's byte order; [`Error::FeatureNotEnabled`] if it declares a capability
-    /// whose feature isn't enabled.
+    /// [`Error::InvalidUsage`] if it isn't SPIR-V in the host's byte order; [`Error::FeatureNotEnabled`] if it declares
+    /// a capability whose feature isn't enabled.
     fn new(words: &[u32], features: &Features, extensions: &[&CStr]) -> Result<Self, Error> {
         if words.first() != Some(&MAGIC) {
             return Err(Error::usage(

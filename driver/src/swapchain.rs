@@ -47,7 +47,8 @@ struct PresentableImage {
 
 impl Drop for PresentableImage {
     fn drop(&mut self) {
-        // SAFETY: the handle was made with the image, and the application may not use it once the swapchain is destroyed.
+        // SAFETY: the handle was made with the image, and the application may not use it once the swapchain is
+        // destroyed.
         if let Err(error) = unsafe { handle::destroy(self.handle) } {
             log::error!("the handle of a swapchain's image was overwritten: {error}");
         }

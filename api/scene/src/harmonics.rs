@@ -134,7 +134,8 @@ fn quadrature() -> impl Iterator<Item = (DVec3, f64)> {
     })
 }
 
-/// The real spherical harmonics in direction `d`, a unit vector, with the Condon-Shortley phase: 3DGS's order and signs.
+/// The real spherical harmonics in direction `d`, a unit vector, with the Condon-Shortley phase: 3DGS's order and
+/// signs.
 pub(crate) fn basis(d: DVec3) -> [f64; BASIS] {
     const DEGREE: usize = MAX_SH_DEGREE as usize;
     let mut values = [0.0; BASIS];

@@ -4,8 +4,8 @@ use crate::window::WindowLost;
 use ash::vk;
 use std::borrow::Cow;
 
-/// The reason that a command failed. The message goes to `log` and to the instance's debug messengers; the application receives
-/// [`Error::result`].
+/// The reason that a command failed. The message goes to `log` and to the instance's debug messengers; the application
+/// receives [`Error::result`].
 #[derive(Clone, Debug, thiserror::Error)]
 pub(crate) enum Error {
     /// A handle that is null, destroyed or of another type.

@@ -307,8 +307,8 @@ impl Recorder {
     /// Ends the recording.
     ///
     /// # Errors
-    /// The first error met while recording, or [`Error::InvalidUsage`] if it was not recording or a pass has not ended. The
-    /// command buffer is invalid then.
+    /// The first error met while recording, or [`Error::InvalidUsage`] if it was not recording or a pass has not ended.
+    /// The command buffer is invalid then.
     pub(crate) fn end(&mut self) -> Result<(), Error> {
         self.command = "vkEndCommandBuffer";
         self.require_recording()?;

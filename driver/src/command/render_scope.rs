@@ -117,7 +117,8 @@ impl RenderPassInstance {
     /// The packet that begins a subpass.
     ///
     /// # Errors
-    /// [`Error::InvalidUsage`] if the pass has no such subpass, a view is missing, or views cannot be attachments of one subpass.
+    /// [`Error::InvalidUsage`] if the pass has no such subpass, a view is missing, or views cannot be attachments of
+    /// one subpass.
     pub(crate) fn subpass(&self, index: usize) -> Result<Packet, Error> {
         let Some(subpass) = self.render_pass.subpasses.get(index) else {
             return Err(Error::usage(
@@ -320,7 +321,8 @@ impl DynamicRendering {
     /// The packet that begins it.
     ///
     /// # Errors
-    /// [`Error::InvalidUsage`] for operations that Vulkan does not have and for views that cannot be attachments together.
+    /// [`Error::InvalidUsage`] for operations that Vulkan does not have and for views that cannot be attachments
+    /// together.
     pub(crate) fn packet(&self) -> Result<Packet, Error> {
         let optional = |attachment: &Option<DynamicAttachment>, aspect| {
             attachment

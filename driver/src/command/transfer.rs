@@ -430,8 +430,8 @@ fn copy_image(source: &Image, target: &Image, regions: &[vk::ImageCopy2]) -> Res
 /// `vkCmdBlitImage`.
 ///
 /// # Errors
-/// [`Error::InvalidUsage`] if an image is not bound, has no such subresource or several samples, or if the formats don't
-/// convert to each other; [`Error::FeatureNotPresent`] for filters of extensions.
+/// [`Error::InvalidUsage`] if an image is not bound, has no such subresource or several samples, or if the formats
+/// don't convert to each other; [`Error::FeatureNotPresent`] for filters of extensions.
 fn blit_image(
     source: &Image,
     target: &Image,
@@ -472,8 +472,8 @@ fn blit_image(
 /// `vkCmdResolveImage`.
 ///
 /// # Errors
-/// [`Error::InvalidUsage`] if an image is not bound or has no such subresource, if the target has several samples, or if
-/// the formats differ.
+/// [`Error::InvalidUsage`] if an image is not bound or has no such subresource, if the target has several samples, or
+/// if the formats differ.
 fn resolve_image(
     source: &Image,
     target: &Image,

@@ -24,8 +24,8 @@ impl ComputePipeline {
     /// Translates a compute shader.
     ///
     /// # Errors
-    /// [`Error::InvalidShader`] if it is malformed or asks for what the device lacks; [`Error::InvalidUsage`] if it does not
-    /// fit the layout.
+    /// [`Error::InvalidShader`] if it is malformed or asks for what the device lacks; [`Error::InvalidUsage`] if it
+    /// does not fit the layout.
     pub(crate) fn new(
         device: &Device,
         layout: &PipelineLayout,

@@ -72,7 +72,8 @@ impl WindowSystem for Xlib {
 /// The pointer is an open `Display`.
 unsafe fn connection_of_display(display: NonNull<c_void>) -> Result<NonNull<c_void>, WindowLost> {
     type GetConnection = unsafe extern "C" fn(*mut c_void) -> *mut c_void;
-    // SAFETY: the library is a part of Xlib, and starts nothing when it is loaded; the function has that type in its header.
+    // SAFETY: the library is a part of Xlib, and starts nothing when it is loaded; the function has that type in its
+    // header.
     let connection = unsafe {
         let library = Library::new("libX11-xcb.so.1").map_err(lost)?;
         let get = library
@@ -89,8 +90,8 @@ unsafe fn connection_of_display(display: NonNull<c_void>) -> Result<NonNull<c_vo
 /// The pointer is an `xcb_connection_t`.
 unsafe fn check_connection(connection: NonNull<c_void>) -> Result<(), WindowLost> {
     type HasError = unsafe extern "C" fn(*mut c_void) -> c_int;
-    // SAFETY: the application has loaded the library, or there would be no connection; the function has that type in its
-    // header.
+    // SAFETY: the application has loaded the library, or there would be no connection; the function has that type in
+    // its header.
     let error = unsafe {
         let library = Library::new("libxcb.so.1").map_err(lost)?;
         let has_error = library

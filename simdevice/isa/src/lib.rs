@@ -46,8 +46,8 @@
 //!
 //! # Stages of a program
 //!
-//! [`builder::Builder`] → [`ir::Program`], checked → [`machine::Executable`] (optimized, registers allocated, control flow
-//! linearized, lanes fixed) → [`machine::Machine::run`], once a batch.
+//! [`builder::Builder`] → [`ir::Program`], checked → [`machine::Executable`] (optimized, registers allocated, control
+//! flow linearized, lanes fixed) → [`machine::Machine::run`], once a batch.
 //!
 //! # Modules
 //!

@@ -35,8 +35,8 @@ struct Search {
 }
 
 impl Search {
-    /// Reports whether all stores so far are of constants, by all lanes, and before all loads. `always` says whether every
-    /// lane runs the block, once.
+    /// Reports whether all stores so far are of constants, by all lanes, and before all loads. `always` says whether
+    /// every lane runs the block, once.
     fn block(&mut self, block: &Block, always: bool) -> bool {
         block
             .iter()

@@ -33,8 +33,8 @@ const MAX_VECTORS: usize = 1 << 22;
 pub struct Options {
     /// Lanes of a batch: a multiple of 16, at most [`MAX_LANES`].
     pub lanes: usize,
-    /// Lanes of a subgroup: a power of two, at least 4 and at most [`MAX_SUBGROUP_SIZE`]. The last subgroup of a batch may
-    /// be smaller.
+    /// Lanes of a subgroup: a power of two, at least 4 and at most [`MAX_SUBGROUP_SIZE`]. The last subgroup of a batch
+    /// may be smaller.
     pub subgroup_size: usize,
     /// True to count the work done (see [`crate::machine::Machine::take_work`]).
     pub count_work: bool,

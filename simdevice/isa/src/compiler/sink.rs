@@ -5,8 +5,8 @@ use crate::ir::{Block, Program, Register, Role, Statement};
 /// The number of statements before an assignment in which [`sink`] looks for the computation.
 const NEARBY: usize = 64;
 
-/// Moves each computation whose result is only assigned to a variable to just before that assignment, so that the two can
-/// be one step.
+/// Moves each computation whose result is only assigned to a variable to just before that assignment, so that the two
+/// can be one step.
 pub fn sink(program: &mut Program) {
     sink_block(&mut program.body, &program.registers);
 }

@@ -26,7 +26,8 @@ impl MaskId {
 /// An index into the steps.
 pub type Target = u32;
 
-/// One step of the machine. Masks are explicit; a jump is taken when a set of lanes is empty, or by a uniform condition.
+/// One step of the machine. Masks are explicit; a jump is taken when a set of lanes is empty, or by a uniform
+/// condition.
 #[derive(Clone, Debug)]
 pub enum Step {
     /// `dst = op(src...)` in all lanes.

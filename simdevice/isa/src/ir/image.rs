@@ -94,7 +94,8 @@ pub struct Sample {
     pub gather: Option<u8>,
 }
 
-/// An access to one texel by integer coordinates, unfiltered (a fetch from a sampled image or a read of a storage image).
+/// An access to one texel by integer coordinates, unfiltered (a fetch from a sampled image or a read of a storage
+/// image).
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImageRead {
     /// Red, green, blue, alpha; None for a component that is not used.

@@ -1,5 +1,5 @@
-//! Frames per second and the end-to-end speed-up, predicted: stages 1 and 2 from the shader cores' roofline, stage 3 from
-//! the pairs that its published time implies.
+//! Frames per second and the end-to-end speed-up, predicted: stages 1 and 2 from the shader cores' roofline, stage 3
+//! from the pairs that its published time implies.
 
 use super::numbers::{FPS, SCENES, SPEEDUP, Scene, implied_pairs};
 use super::table::{Label, Row, Section};
