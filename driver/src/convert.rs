@@ -82,7 +82,8 @@ pub(crate) fn compare_op(op: vk::CompareOp, vuid: &'static str) -> Result<Compar
 
 /// The device's stencil operation.
 ///
-/// # Errors [`Error::InvalidUsage`] with the id `vuid` for an unknown value.
+/// # Errors
+/// [`Error::InvalidUsage`] with the id `vuid` for an unknown value.
 pub(crate) fn stencil_op(op: vk::StencilOp, vuid: &'static str) -> Result<StencilOp, Error> {
     match op {
         vk::StencilOp::KEEP => Ok(StencilOp::Keep),
@@ -133,7 +134,8 @@ impl StencilOps {
 
     /// The device's operations.
     ///
-    /// # Errors [`Error::InvalidUsage`] for unknown values.
+    /// # Errors
+    /// [`Error::InvalidUsage`] for unknown values.
     pub(crate) fn from_vk(
         fail: vk::StencilOp,
         pass: vk::StencilOp,
@@ -152,7 +154,8 @@ impl StencilOps {
 
 /// The device's logic operation.
 ///
-/// # Errors [`Error::InvalidUsage`] for an unknown value.
+/// # Errors
+/// [`Error::InvalidUsage`] for an unknown value.
 pub(crate) fn logic_op(op: vk::LogicOp) -> Result<LogicOp, Error> {
     match op {
         vk::LogicOp::CLEAR => Ok(LogicOp::Clear),
@@ -180,7 +183,8 @@ pub(crate) fn logic_op(op: vk::LogicOp) -> Result<LogicOp, Error> {
 
 /// The blend equations of an attachment's colour and alpha.
 ///
-/// # Errors Returns an [`Error`] for unknown factors and operations.
+/// # Errors
+/// Returns an [`Error`] for unknown factors and operations.
 pub(crate) fn blend_equations(
     state: &vk::PipelineColorBlendAttachmentState,
 ) -> Result<(BlendEquation, BlendEquation), Error> {

@@ -44,8 +44,8 @@ objects! {
 impl Device {
     /// Opens a device with a queue of each of these families.
     ///
-    /// # Errors [`Error::InitializationFailed`] if the host can't start a queue's thread, or an environment variable is
-    /// invalid.
+    /// # Errors
+    /// [`Error::InitializationFailed`] if the host can't start a queue's thread, or an environment variable is invalid.
     pub(crate) fn new(
         instance: Arc<Instance>,
         extensions: Vec<&'static CStr>,

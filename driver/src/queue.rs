@@ -43,7 +43,8 @@ objects! {
 impl Queue {
     /// Starts the thread of a queue whose work runs on `processor`.
     ///
-    /// # Errors [`Error::InitializationFailed`] if the host can't start a thread.
+    /// # Errors
+    /// [`Error::InitializationFailed`] if the host can't start a thread.
     pub(crate) fn start(
         instance: Arc<Instance>,
         sync: Arc<DeviceSync>,

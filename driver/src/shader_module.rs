@@ -67,7 +67,8 @@ impl ShaderModule {
 /// Refuses a module that declares a capability that isn't enabled. Capabilities that the translator doesn't know are
 /// left for it to refuse.
 ///
-/// # Errors [`Error::FeatureNotEnabled`] names the capability and the features or extensions that enable it.
+/// # Errors
+/// [`Error::FeatureNotEnabled`] names the capability and the features or extensions that enable it.
 fn check_capabilities(
     words: &[u32],
     features: &Features,
@@ -156,7 +157,8 @@ pub(crate) struct ShaderStage<'a> {
 impl<'a> ShaderStage<'a> {
     /// The stage of a create info.
     ///
-    /// # Errors [`Error::InvalidUsage`] for an invalid name or subgroup size.
+    /// # Errors
+    /// [`Error::InvalidUsage`] for an invalid name or subgroup size.
     ///
     /// # Safety
     /// The create info and its chain are valid.

@@ -76,7 +76,8 @@ impl Surface {
 
     /// Prepares the window for a swapchain's images.
     ///
-    /// # Errors [`Error::SurfaceLost`], or [`Error::InvalidUsage`] for an unsupported present mode.
+    /// # Errors
+    /// [`Error::SurfaceLost`], or [`Error::InvalidUsage`] for an unsupported present mode.
     pub(crate) fn canvas(
         &self,
         extent: vk::Extent2D,

@@ -402,7 +402,8 @@ fn present_one(queue: &Queue, swapchain: &Swapchain, index: u32) -> Result<vk::R
     status
 }
 
-/// # Safety The info, its chain and its handles are valid, and its results are null or have enough elements.
+/// # Safety
+/// The info, its chain and its handles are valid, and its results are null or have enough elements.
 #[doc(alias = "vkQueuePresentKHR")]
 pub(crate) unsafe fn queue_present(
     queue: &Queue,

@@ -39,10 +39,11 @@ pub trait WindowSystem: Sync {
 
     /// Opens a window.
     ///
-    /// # Errors [`WindowLost`] if pictures can't be shown in it, or it is of another window system.
+    /// # Errors
+    /// [`WindowLost`] if pictures can't be shown in it, or it is of another window system.
     ///
-    /// # Safety The window's pointers are valid, and stay so until the returned window and everything made of it are
-    /// dropped.
+    /// # Safety
+    /// The window's pointers are valid, and stay so until the returned window and everything made of it are dropped.
     unsafe fn open(&self, window: NativeWindow) -> Result<Box<dyn Window>, WindowLost>;
 }
 

@@ -8,7 +8,8 @@ use tempfile::NamedTempFile;
 /// Writes `bytes` to the file `path`. The file that was there is replaced when everything has been written, and is
 /// unchanged if something fails. A path that is not a regular file, such as a pipe or a device, is written to directly.
 ///
-/// # Errors Returns the system's error.
+/// # Errors
+/// Returns the system's error.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> io::Result<()> {
     if path.metadata().is_ok_and(|there| !there.is_file()) {
         return std::fs::write(path, bytes);

@@ -232,7 +232,8 @@ pub fn write_encoded(
 
 /// The bytes of a file of `picture`.
 ///
-/// # Errors Returns the reason that the picture doesn't fit the format.
+/// # Errors
+/// Returns the reason that the picture doesn't fit the format.
 pub fn encode(
     format: PictureFormat,
     picture: &Picture,

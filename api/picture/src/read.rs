@@ -15,7 +15,8 @@ const MAX_PIXELS: u64 = 1 << 29;
 /// Reads the picture file at `path`, whose extension gives the format. Values of eight or sixteen bits are scaled to 0
 /// to 1 and premultiplied by alpha; floats are unchanged.
 ///
-/// # Errors [`OutputError::UnknownFormat`], [`OutputError::Io`], or [`OutputError::Encode`] for a file that is damaged.
+/// # Errors
+/// [`OutputError::UnknownFormat`], [`OutputError::Io`], or [`OutputError::Encode`] for a file that is damaged.
 pub fn read(path: &Path) -> Result<Picture, OutputError> {
     let format = PictureFormat::of(path)?;
     let io = |source| OutputError::Io {

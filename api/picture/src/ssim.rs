@@ -17,7 +17,8 @@ const C2: f64 = 0.03 * 0.03;
 
 /// The mean SSIM of red, green and blue, at most 1, which is the value of equal images. Rows have `width` pixels.
 ///
-/// # Panics Panics if the sizes differ.
+/// # Panics
+/// Panics if the sizes differ.
 pub fn ssim(image: &[[f32; 4]], reference: &[[f32; 4]], width: u32) -> f64 {
     assert_eq!(image.len(), reference.len(), "the sizes differ");
     if image.is_empty() {

@@ -73,7 +73,8 @@ struct PhysicalDevice {
 impl Device {
     /// Creates a device on the first physical device of `entry` that serves the purpose.
     ///
-    /// # Errors Returns an error if there is none, or Vulkan fails.
+    /// # Errors
+    /// Returns an error if there is none, or Vulkan fails.
     pub fn new(entry: ash::Entry, purpose: Purpose<'_>) -> Result<Self, RenderError> {
         let instance = Instance::new(entry)?;
         let physical = PhysicalDevice::choose(&instance.raw, purpose)?;

@@ -62,7 +62,8 @@ pub enum RenderError {
 pub trait During<T> {
     /// Returns the value, or the error with the name of the `call` that failed.
     ///
-    /// # Errors Returns an error if the call failed.
+    /// # Errors
+    /// Returns an error if the call failed.
     fn during(self, call: &'static str) -> Result<T, RenderError>;
 }
 

@@ -68,7 +68,8 @@ impl Renderer {
 
     /// Includes counters that affect performance, such as those of simulated hardware.
     ///
-    /// # Errors Returns an error if Vulkan fails.
+    /// # Errors
+    /// Returns an error if Vulkan fails.
     pub fn count_everything(&mut self) -> Result<(), RenderError> {
         // A device has only one profiling lock.
         self.query = None;
@@ -203,7 +204,8 @@ impl Renderer {
 
     /// Draws `scene` as `camera` sees it, in a picture of the camera's size.
     ///
-    /// # Errors Returns an error if the size exceeds the device's limits, modes can't be combined, or Vulkan fails.
+    /// # Errors
+    /// Returns an error if the size exceeds the device's limits, modes can't be combined, or Vulkan fails.
     pub fn render(&mut self, scene: &DeviceScene, camera: &Camera) -> Result<Frame, RenderError> {
         let (width, height) = (camera.width, camera.height);
         check_size(&self.device, width, height)?;

@@ -94,7 +94,8 @@ impl Camera {
     /// A camera at `eye` that looks at `target`, with `up` upwards in the picture. `fov` is the vertical field of view
     /// in degrees; `size` is the picture's size in pixels.
     ///
-    /// # Errors See [`CameraError`].
+    /// # Errors
+    /// See [`CameraError`].
     pub fn look_at(
         eye: [f64; 3],
         target: [f64; 3],

@@ -26,7 +26,8 @@ pub struct Scene {
 impl Scene {
     /// An empty scene of spherical harmonics degree `sh_degree`, with memory reserved for `count` Gaussians.
     ///
-    /// # Panics Panics if `sh_degree` exceeds [`MAX_SH_DEGREE`].
+    /// # Panics
+    /// Panics if `sh_degree` exceeds [`MAX_SH_DEGREE`].
     pub fn with_capacity(sh_degree: u32, count: usize) -> Self {
         assert!(
             sh_degree <= MAX_SH_DEGREE,

@@ -48,7 +48,8 @@ pub struct Function {
 impl Declarations {
     /// Reads the sources of ash, which `cargo metadata` finds, and the definitions of gaurast, which are given.
     ///
-    /// # Errors [`Error::Program`] if cargo doesn't know ash; [`Error::File`] and [`Error::Rust`] if its source has an
+    /// # Errors
+    /// [`Error::Program`] if cargo doesn't know ash; [`Error::File`] and [`Error::Rust`] if its source has an
     /// unexpected form.
     pub fn read(root: &Path, gaurast: &File) -> Result<Self, Error> {
         let ash = ash_folder(root)?.join("src/vk");

@@ -24,7 +24,8 @@ pub(crate) struct EntryPoint {
 
 /// Finds all functions, by the names of their commands.
 ///
-/// # Errors [`Error::EntryPoint`] if two functions have the same command.
+/// # Errors
+/// [`Error::EntryPoint`] if two functions have the same command.
 pub(crate) fn find(root: &Path) -> Result<BTreeMap<String, EntryPoint>, Error> {
     let folder = root.join(FOLDER);
     let mut found = BTreeMap::new();

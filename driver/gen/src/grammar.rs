@@ -66,7 +66,8 @@ impl Enumerant {
 
 /// Generates the table of SPIR-V's grammar from `spirv.core.grammar.json`.
 ///
-/// # Errors [`Error::OtherRegistry`], and the errors of reading and parsing.
+/// # Errors
+/// [`Error::OtherRegistry`], and the errors of reading and parsing.
 pub fn generate(json: &Path) -> Result<File, Error> {
     let text = registry::read_version(json, VERSION, SHA256)?;
     let grammar: Grammar = serde_json::from_str(&text).map_err(|error| Error::Registry {

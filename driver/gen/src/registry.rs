@@ -108,7 +108,8 @@ pub struct Extension {
 impl Registry {
     /// Reads `vk.xml`, which must be of [`VERSION`], and the extension's fragment.
     ///
-    /// # Errors [`Error::OtherRegistry`], and the errors of reading and parsing.
+    /// # Errors
+    /// [`Error::OtherRegistry`], and the errors of reading and parsing.
     pub fn read(vk_xml: &Path, fragment: &Path) -> Result<Self, Error> {
         read_version(vk_xml, VERSION, SHA256)?;
         let mut registry = Self::default();

@@ -89,7 +89,8 @@ impl Support {
 
     /// The core version.
     ///
-    /// # Errors [`Error::Support`] if the text is not a version.
+    /// # Errors
+    /// [`Error::Support`] if the text is not a version.
     pub fn version(&self) -> Result<Version, Error> {
         registry::version(&self.core.version)
             .ok_or_else(|| Error::Support(format!("{} is no version", self.core.version)))
@@ -114,9 +115,10 @@ impl Support {
 
     /// Checks that the file agrees with the registry.
     ///
-    /// # Errors [`Error::Support`] names the first extension that is unknown, lacks a dependency, or was promoted to
-    /// core and is neither listed nor absent with a reason; or the first mandatory feature that is neither supported
-    /// nor missing with a reason.
+    /// # Errors
+    /// [`Error::Support`] names the first extension that is unknown, lacks a dependency, or was promoted to core and is
+    /// neither listed nor absent with a reason; or the first mandatory feature that is neither supported nor missing
+    /// with a reason.
     pub fn check(&self, registry: &Registry) -> Result<(), Error> {
         let wrong = |text: String| Err(Error::Support(text));
         for name in self.extension.keys().chain(self.absent.keys()) {

@@ -13,7 +13,8 @@ pub(crate) const HEADER_WORDS: usize = 5;
 
 /// Decodes the instructions of a module, in order, and passes each to `each`.
 ///
-/// # Errors [`Error::Binary`] names the first word that violates the grammar. An error of `each` is returned.
+/// # Errors
+/// [`Error::Binary`] names the first word that violates the grammar. An error of `each` is returned.
 pub(crate) fn decode(
     words: &[u32],
     mut each: impl FnMut(Instruction) -> Result<(), Error>,

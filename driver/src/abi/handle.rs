@@ -216,7 +216,8 @@ pub(crate) unsafe fn get_all_optional<H: Handle>(
 
 /// Destroys a handle and returns the object that it owned. A null handle is ignored.
 ///
-/// # Errors [`Error::InvalidHandle`] if the handle is of another type; it is not destroyed.
+/// # Errors
+/// [`Error::InvalidHandle`] if the handle is of another type; it is not destroyed.
 ///
 /// # Safety
 /// As [`get`]; and nothing uses the handle during or after this call.

@@ -140,9 +140,11 @@ pub(crate) unsafe fn output_slice<'a, T>(
 /// The two-call idiom over plain values: without an array, writes their number; with one, writes as many as fit, and
 /// the number written.
 ///
-/// # Errors [`Error::NullPointer`] if `count` is null.
+/// # Errors
+/// [`Error::NullPointer`] if `count` is null.
 ///
-/// # Safety See the module; `out` is null or has space for `*count` values.
+/// # Safety
+/// See the module; `out` is null or has space for `*count` values.
 pub(crate) unsafe fn enumerate<T: Copy>(
     count: *mut u32,
     out: *mut T,
@@ -180,7 +182,8 @@ impl<'a, T> Structures<'a, T> {
     /// Writes the number of structures if there is no array; otherwise calls `fill(index, structure)` for each that
     /// fits. `fill` must not change `sType` and `pNext`.
     ///
-    /// # Errors None; the result is for the application.
+    /// # Errors
+    /// None; the result is for the application.
     pub(crate) fn fill(
         self,
         available: usize,

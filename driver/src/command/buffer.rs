@@ -68,9 +68,11 @@ impl CommandPool {
 
     /// Frees command buffers of this pool; others are not freed.
     ///
-    /// # Errors [`Error::InvalidUsage`] if one is not of this pool.
+    /// # Errors
+    /// [`Error::InvalidUsage`] if one is not of this pool.
     ///
-    /// # Safety Nothing uses the handles any more.
+    /// # Safety
+    /// Nothing uses the handles any more.
     pub(crate) unsafe fn free(&self, buffers: &[vk::CommandBuffer]) -> Result<(), Error> {
         let null = vk::CommandBuffer::null();
         for &buffer in buffers.iter().filter(|&&buffer| buffer != null) {
@@ -149,7 +151,8 @@ impl CommandBuffer {
 
     /// Records a command. An error of `record` is reported now, and `vkEndCommandBuffer` fails with the first.
     ///
-    /// # Errors Returns the error of `record`, or [`Error::InvalidUsage`] if the command buffer is not recording.
+    /// # Errors
+    /// Returns the error of `record`, or [`Error::InvalidUsage`] if the command buffer is not recording.
     pub(crate) fn record(
         &self,
         command: &'static str,

@@ -10,8 +10,9 @@ use simdevice::state::gaussian::{Camera, CameraModel};
 
 /// Converts a camera for the device.
 ///
-/// # Errors [`Error::FeatureNotPresent`] for a model that the device does not have, [`Error::InvalidUsage`] for values
-/// that no camera has.
+/// # Errors
+/// [`Error::FeatureNotPresent`] for a model that the device does not have, [`Error::InvalidUsage`] for values that no
+/// camera has.
 fn camera(camera: &GaussianCameraGAURAST) -> Result<Camera, Error> {
     let model = match camera.model {
         GaussianCameraModelGAURAST::PINHOLE => CameraModel::Pinhole,

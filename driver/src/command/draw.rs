@@ -93,7 +93,8 @@ fn draw_multi(recorder: &mut Recorder, draws: Vec<DrawParameters>) -> Result<(),
     Ok(())
 }
 
-/// # Safety The array has as many infos as the count says, `stride` bytes apart.
+/// # Safety
+/// The array has as many infos as the count says, `stride` bytes apart.
 #[doc(alias = "vkCmdDrawMultiEXT")]
 pub(crate) unsafe fn cmd_draw_multi(
     recorder: &mut Recorder,

@@ -91,8 +91,9 @@ pub(crate) fn is_supported(kind: vk::DescriptorType) -> bool {
 impl DescriptorSetLayout {
     /// A layout of bindings. The flags say how its sets are allocated and updated.
     ///
-    /// # Errors [`Error::FeatureNotPresent`] for an unsupported kind of descriptor, or too many of them;
-    /// [`Error::InvalidUsage`] if two bindings have the same number, or bindings contradict their flags.
+    /// # Errors
+    /// [`Error::FeatureNotPresent`] for an unsupported kind of descriptor, or too many of them; [`Error::InvalidUsage`]
+    /// if two bindings have the same number, or bindings contradict their flags.
     pub(crate) fn new(
         infos: Vec<BindingInfo>,
         flags: vk::DescriptorSetLayoutCreateFlags,

@@ -56,7 +56,8 @@ impl DescriptorPool {
     /// Allocates a set of each layout, with the number of descriptors of its variable binding from `variable_counts`,
     /// or none.
     ///
-    /// # Errors [`Error::OutOfPoolMemory`], or [`Error::OutOfDeviceMemory`] for the bytes of inline uniform blocks;
+    /// # Errors
+    /// [`Error::OutOfPoolMemory`], or [`Error::OutOfDeviceMemory`] for the bytes of inline uniform blocks;
     /// [`Error::InvalidUsage`] if sets of the layout are updated after bind and those of the pool are not.
     pub(crate) fn allocate(
         &self,
@@ -106,8 +107,9 @@ impl DescriptorPool {
 
     /// Frees sets of this pool. Null handles are ignored.
     ///
-    /// # Errors [`Error::InvalidUsage`] if sets of this pool are not freed individually, or one is not of this pool; it
-    /// is not freed.
+    /// # Errors
+    /// [`Error::InvalidUsage`] if sets of this pool are not freed individually, or one is not of this pool; it is not
+    /// freed.
     ///
     /// # Safety
     /// Nothing uses the handles any more.
@@ -141,7 +143,8 @@ impl DescriptorPool {
 
     /// Frees every set.
     ///
-    /// # Errors None, unless the driver has a defect.
+    /// # Errors
+    /// None, unless the driver has a defect.
     ///
     /// # Safety
     /// Nothing uses the handles of the pool's sets any more.

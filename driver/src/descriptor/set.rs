@@ -145,8 +145,9 @@ impl DescriptorSet {
 
     /// Replaces descriptors.
     ///
-    /// # Errors [`Error::InvalidUsage`], and nothing is replaced, if the set does not have these descriptors, or they
-    /// are of another kind.
+    /// # Errors
+    /// [`Error::InvalidUsage`], and nothing is replaced, if the set does not have these descriptors, or they are of
+    /// another kind.
     pub(crate) fn write(&self, write: &Write) -> Result<(), Error> {
         if write.kind == vk::DescriptorType::INLINE_UNIFORM_BLOCK {
             let block = self.inline_block(write.binding)?;
@@ -190,7 +191,8 @@ impl DescriptorSet {
 
     /// Replaces `count` descriptors by those of another set, or of another part of this one.
     ///
-    /// # Errors [`Error::InvalidUsage`], and nothing is replaced, if either set does not have these descriptors.
+    /// # Errors
+    /// [`Error::InvalidUsage`], and nothing is replaced, if either set does not have these descriptors.
     pub(crate) fn copy(
         &self,
         (binding, element): (u32, u32),
@@ -239,7 +241,8 @@ impl DescriptorSet {
 
     /// The bytes of the inline uniform block of a binding.
     ///
-    /// # Errors [`Error::InvalidUsage`] if the binding is not an inline uniform block.
+    /// # Errors
+    /// [`Error::InvalidUsage`] if the binding is not an inline uniform block.
     fn inline_block(&self, binding: u32) -> Result<BufferRange, Error> {
         let found = self.layout.binding(binding);
         let block = found.filter(|binding| binding.inline_bytes > 0);
@@ -278,7 +281,8 @@ fn inline_block(bytes: u32) -> Result<Descriptor, Error> {
 
 /// Reads or writes `count` bytes of an inline uniform block from byte `start` on.
 ///
-/// # Errors [`Error::InvalidUsage`] if the block does not have these bytes.
+/// # Errors
+/// [`Error::InvalidUsage`] if the block does not have these bytes.
 fn in_block<E>(
     block: &BufferRange,
     start: u32,
@@ -523,7 +527,8 @@ unsafe fn descriptors(
 
 /// An image's view and a sampler, if they are used; the others may be invalid.
 ///
-/// # Safety The handles that are used are live.
+/// # Safety
+/// The handles that are used are live.
 unsafe fn image(
     view: bool,
     sampler: bool,

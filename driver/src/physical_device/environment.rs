@@ -38,7 +38,8 @@ const DUMP: &str = "GAURAST_DUMP";
 
 /// Opens a simulated device with the configuration from the environment.
 ///
-/// # Errors [`Error::InitializationFailed`] for a value that is invalid or that this machine can't satisfy.
+/// # Errors
+/// [`Error::InitializationFailed`] for a value that is invalid or that this machine can't satisfy.
 pub(crate) fn open_device() -> Result<simdevice::Device, Error> {
     let mut config = config(
         variable(SIMD)?.as_deref(),
@@ -86,7 +87,8 @@ pub(crate) struct Dump {
 
 /// The things that the environment asks to print.
 ///
-/// # Errors [`Error::InitializationFailed`] for an unknown name.
+/// # Errors
+/// [`Error::InitializationFailed`] for an unknown name.
 pub(crate) fn dump() -> Result<Dump, Error> {
     parse_dump(variable(DUMP)?.as_deref().unwrap_or_default())
 }

@@ -251,7 +251,8 @@ pub(crate) struct ImageQuery {
 
 /// `VkImageFormatProperties`: the limits of such an image.
 ///
-/// # Errors [`Error::FormatNotSupported`] if no such image is supported.
+/// # Errors
+/// [`Error::FormatNotSupported`] if no such image is supported.
 pub(crate) fn image_properties(query: ImageQuery) -> Result<vk::ImageFormatProperties, Error> {
     let refuse = |what: String| Err(Error::FormatNotSupported(what));
     let ImageQuery {

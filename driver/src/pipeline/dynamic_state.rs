@@ -284,7 +284,8 @@ impl DynamicStates {
 
     /// Puts the values of the states `dynamic` that are set into fixed-function state.
     ///
-    /// # Errors The first state that is not set but needed by the draw.
+    /// # Errors
+    /// The first state that is not set but needed by the draw.
     pub(crate) fn apply(
         &self,
         dynamic: &[vk::DynamicState],

@@ -77,7 +77,8 @@ impl PipelineLayout {
 
     /// Checks that the layout has the resources that a shader uses.
     ///
-    /// # Errors [`Error::InvalidUsage`] lists everything that is missing.
+    /// # Errors
+    /// [`Error::InvalidUsage`] lists everything that is missing.
     pub(crate) fn check(&self, interface: &Interface) -> Result<(), Error> {
         let mismatches = self.mismatches(interface);
         if mismatches.is_empty() {

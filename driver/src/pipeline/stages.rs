@@ -43,7 +43,8 @@ pub(crate) fn translate(
 
 /// The sources of the attributes at locations.
 ///
-/// # Errors [`Error::InvalidUsage`] for a location without an attribute, or with an attribute of another numeric type.
+/// # Errors
+/// [`Error::InvalidUsage`] for a location without an attribute, or with an attribute of another numeric type.
 pub(crate) fn attributes(
     info: &VertexInputState,
     locations: &[(u32, ScalarType)],

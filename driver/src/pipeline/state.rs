@@ -442,7 +442,8 @@ pub(crate) struct AttributeSource {
 
 /// Finds the attribute at `location`, which the extension calls `name` and for which it needs `components`.
 ///
-/// # Errors An [`Error`] if the location, its binding or its format is unsuitable.
+/// # Errors
+/// An [`Error`] if the location, its binding or its format is unsuitable.
 pub(crate) fn attribute(
     info: &GraphicsState,
     name: &str,
@@ -552,7 +553,8 @@ impl AttachmentState {
 
 /// The state of all colour attachments.
 ///
-/// # Errors An [`Error`] if their number is not that of the attachments, or for state that the device doesn't support.
+/// # Errors
+/// An [`Error`] if their number is not that of the attachments, or for state that the device doesn't support.
 fn attachment_states(info: &GraphicsState) -> Result<Vec<AttachmentState>, Error> {
     let enables = info.fragment_output.color_write_enables;
     let with_enables = |index: usize, state: AttachmentState| AttachmentState {
@@ -677,7 +679,8 @@ impl FixedFunctionState {
 
     /// As [`FixedFunctionState::new`], for the fragments of Gaussians.
     ///
-    /// # Errors As there.
+    /// # Errors
+    /// As there.
     pub(crate) fn of_gaussians(info: &GraphicsState) -> Result<Self, Error> {
         // The topology has no effect.
         let mut state = Self::of(info, Topology::TriangleStrip)?;

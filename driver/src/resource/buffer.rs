@@ -108,7 +108,8 @@ impl Buffer {
 
     /// `size` bytes from `offset` on; with `None` (`VK_WHOLE_SIZE`) all bytes from there on.
     ///
-    /// # Errors [`Error::InvalidUsage`] if the buffer is not bound or does not have these bytes.
+    /// # Errors
+    /// [`Error::InvalidUsage`] if the buffer is not bound or does not have these bytes.
     pub(crate) fn range(
         &self,
         offset: u64,

@@ -51,8 +51,9 @@ impl Memory {
 
     /// Maps `size` bytes from `offset` on; with `None`, all bytes from there on.
     ///
-    /// # Errors [`Error::MemoryMapFailed`] if it is not host-visible, [`Error::InvalidUsage`] if it is mapped already
-    /// or the range exceeds it.
+    /// # Errors
+    /// [`Error::MemoryMapFailed`] if it is not host-visible, [`Error::InvalidUsage`] if it is mapped already or the
+    /// range exceeds it.
     pub(crate) fn map(&self, offset: u64, size: Option<u64>) -> Result<*mut u8, Error> {
         if !self.allocation.is_host_visible() {
             return Err(Error::MemoryMapFailed(

@@ -21,8 +21,9 @@ objects! { vk::Sampler => Sampler; }
 impl Sampler {
     /// A sampler from its create info and the structures in its chain.
     ///
-    /// # Errors [`Error::FeatureNotPresent`] for filters, modes and colours of extensions; [`Error::InvalidUsage`] for
-    /// an unknown comparison.
+    /// # Errors
+    /// [`Error::FeatureNotPresent`] for filters, modes and colours of extensions; [`Error::InvalidUsage`] for an
+    /// unknown comparison.
     pub(crate) fn new(
         info: &vk::SamplerCreateInfo<'_>,
         reduction: Option<vk::SamplerReductionMode>,

@@ -16,7 +16,8 @@ pub(crate) struct SharedMemory {
 impl SharedMemory {
     /// Creates `size` bytes, which are zero.
     ///
-    /// # Errors [`WindowLost`] if the system can't provide them.
+    /// # Errors
+    /// [`WindowLost`] if the system can't provide them.
     pub(crate) fn new(size: usize) -> Result<Self, WindowLost> {
         let file = memfd_create("gaurast-picture", MemfdFlags::CLOEXEC).map_err(lost)?;
         ftruncate(&file, size as u64).map_err(lost)?;
@@ -38,7 +39,8 @@ impl SharedMemory {
 
     /// A copy of its file descriptor, for a receiver that closes it.
     ///
-    /// # Errors [`WindowLost`] if the process has no descriptors left.
+    /// # Errors
+    /// [`WindowLost`] if the process has no descriptors left.
     pub(crate) fn own_descriptor(&self) -> Result<OwnedFd, WindowLost> {
         self.descriptor().try_clone_to_owned().map_err(lost)
     }

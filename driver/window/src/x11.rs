@@ -117,8 +117,8 @@ struct X11Window {
 }
 
 impl X11Window {
-    /// # Safety The connection is an `xcb_connection_t` and stays open until the window, and everything made of it, are
-    /// dropped.
+    /// # Safety
+    /// The connection is an `xcb_connection_t` and stays open until the window, and everything made of it, are dropped.
     unsafe fn open(connection: NonNull<c_void>, window: u32) -> Result<Self, WindowLost> {
         // SAFETY: the caller's promise.
         let connection = unsafe {

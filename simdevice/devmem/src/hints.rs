@@ -11,7 +11,8 @@ const HUGE_PAGE: usize = 2 << 20;
 
 /// Requests huge pages for the part of a large range that they fit into. It changes only the time that accesses take.
 ///
-/// # Safety The `len` bytes from `start` on must belong to one allocation of the caller.
+/// # Safety
+/// The `len` bytes from `start` on must belong to one allocation of the caller.
 pub(crate) unsafe fn prefer_huge(start: *mut u8, len: usize) {
     #[cfg(target_os = "linux")]
     if len >= LEAST_HUGE {

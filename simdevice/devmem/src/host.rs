@@ -35,7 +35,8 @@ impl OutOfMemory {
 
 /// Calls `body` and returns its result. Other panics are resumed.
 ///
-/// # Errors Returns [`OutOfMemory`] if an allocation in `body` failed.
+/// # Errors
+/// Returns [`OutOfMemory`] if an allocation in `body` failed.
 pub fn catch<R>(body: impl FnOnce() -> R) -> Result<R, OutOfMemory> {
     catch_unwind(AssertUnwindSafe(body)).map_err(|payload| {
         OutOfMemory::of_panic(payload.as_ref()).unwrap_or_else(|| resume_unwind(payload))

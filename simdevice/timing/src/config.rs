@@ -500,21 +500,24 @@ fn resolve(mut table: Table, depth: usize) -> Result<Table, ConfigError> {
 impl Config {
     /// A preset changed by settings, each `section.field=value`, or `field=value` if only one section has the field.
     ///
-    /// # Errors Returns a [`ConfigError`] for unknown names and numbers out of range.
+    /// # Errors
+    /// Returns a [`ConfigError`] for unknown names and numbers out of range.
     pub fn preset(name: &str, settings: &[String]) -> Result<Self, ConfigError> {
         Self::from_table(preset_table(name, 0)?, settings)
     }
 
     /// A configuration from a file's text, which may inherit from a preset, changed by settings.
     ///
-    /// # Errors As for [`Self::preset`].
+    /// # Errors
+    /// As for [`Self::preset`].
     pub fn parse(text: &str, settings: &[String]) -> Result<Self, ConfigError> {
         Self::from_table(resolve(parse(text)?, 0)?, settings)
     }
 
     /// The configuration changed by settings.
     ///
-    /// # Errors As for [`Self::preset`].
+    /// # Errors
+    /// As for [`Self::preset`].
     pub fn with(&self, settings: &[String]) -> Result<Self, ConfigError> {
         let table = Table::try_from(self).map_err(|error| ConfigError::Toml(error.to_string()))?;
         Self::from_table(table, settings)

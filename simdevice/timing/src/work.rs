@@ -63,7 +63,8 @@ pub enum TraceError {
 impl Trace {
     /// Checks a trace read from a file.
     ///
-    /// # Errors Returns a [`TraceError`] that names the first problem.
+    /// # Errors
+    /// Returns a [`TraceError`] that names the first problem.
     pub fn check(&self) -> Result<(), TraceError> {
         if self.version != TRACE_VERSION {
             return Err(TraceError::Version(self.version));

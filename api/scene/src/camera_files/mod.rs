@@ -17,7 +17,8 @@ pub use view::{CameraFile, CameraFileError, CameraFileOptions, View, ViewError};
 
 /// Reads all cameras of the file at `path`. `size` replaces an image size that a transforms.json doesn't give.
 ///
-/// # Errors Returns an error if the file can't be read, is of no known kind, or has an invalid camera.
+/// # Errors
+/// Returns an error if the file can't be read, is of no known kind, or has an invalid camera.
 pub fn load(path: &Path, size: [u32; 2]) -> Result<Vec<View>, CameraFileError> {
     let options = CameraFileOptions {
         size,
@@ -29,7 +30,8 @@ pub fn load(path: &Path, size: [u32; 2]) -> Result<Vec<View>, CameraFileError> {
 
 /// Reads all cameras of the file, or of COLMAP's folder, at `path`.
 ///
-/// # Errors Returns an error if the file can't be read, is of no known kind, or has an invalid camera.
+/// # Errors
+/// Returns an error if the file can't be read, is of no known kind, or has an invalid camera.
 pub fn read(path: &Path, options: &CameraFileOptions) -> Result<CameraFile, CameraFileError> {
     if let Some(folder) = colmap::folder(path) {
         let mut file = colmap::read(&folder, options)?;

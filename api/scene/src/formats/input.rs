@@ -36,8 +36,8 @@ pub(super) trait Format: Sync {
 
     /// Reads a whole scene.
     ///
-    /// # Errors Returns an error if the input is malformed. A reader allocates nothing that is larger than the input
-    /// can hold.
+    /// # Errors
+    /// Returns an error if the input is malformed. A reader allocates nothing that is larger than the input can hold.
     fn load(&self, input: &mut Input<'_>) -> Result<Scene, Fault>;
 }
 

@@ -31,7 +31,8 @@ pub fn open(path: impl AsRef<Path>) -> Result<Scene, SceneError> {
 /// Reads like [`open`], through the reader that `wrap` makes of the file and its size in bytes; it can show progress,
 /// for example. Standard input, whose size is unknown, is not wrapped; it is read whole before its format is chosen.
 ///
-/// # Errors As [`open`].
+/// # Errors
+/// As [`open`].
 pub fn open_with<R: Read>(
     path: &Path,
     options: &Options,
@@ -74,7 +75,8 @@ fn inside(path: &Path) -> PathBuf {
 /// Reads a scene of `len` bytes from `reader`. `path` selects the format, names the file in errors, and gives the
 /// folder of other files that the scene refers to.
 ///
-/// # Errors As [`open`].
+/// # Errors
+/// As [`open`].
 pub fn read(path: &Path, reader: &mut dyn BufRead, len: u64) -> Result<Scene, SceneError> {
     read_with(path, reader, len, &Options::default())
 }

@@ -40,7 +40,8 @@ pub fn scene(seed: u64, count: usize) -> Scene {
 
 /// The view that [`scene`] is composed for, with another vertical field of view of `fov` degrees if given.
 ///
-/// # Errors Returns [`CameraError::FieldOfView`] unless `fov` is more than 0 and less than 180.
+/// # Errors
+/// Returns [`CameraError::FieldOfView`] unless `fov` is more than 0 and less than 180.
 pub fn camera(fov: Option<f64>, size: [u32; 2]) -> Result<Camera, CameraError> {
     let turn = |v: DVec3| brush::turn(v).to_array();
     Camera::look_at(

@@ -59,7 +59,8 @@ const STACK_BYTES: usize = 16 << 20;
 /// The translation runs on a thread of its own, whose stack is large enough for all allowed nesting, whatever the
 /// application's stack is.
 ///
-/// # Errors [`Error`] names what is malformed, unsupported or too large.
+/// # Errors
+/// [`Error`] names what is malformed, unsupported or too large.
 pub fn translate(
     module: &Module,
     name: &str,

@@ -138,7 +138,8 @@ pub(super) fn attribute_stream(
 
 /// The sources of attributes, from the command buffer's dynamic vertex input.
 ///
-/// # Errors [`DrawError::Dynamic`] if none is set, [`DrawError::VertexInput`] for sources that don't fit the program.
+/// # Errors
+/// [`DrawError::Dynamic`] if none is set, [`DrawError::VertexInput`] for sources that don't fit the program.
 fn dynamic_sources(
     state: &State,
     locations: &[(u32, ScalarType)],

@@ -215,7 +215,8 @@ impl Machine {
 
     /// Runs a batch. `active` are the lanes that run; `helpers` are those among them that only serve derivatives.
     ///
-    /// # Errors Returns an error if the watchdog stopped the batch. Its writes until then remain.
+    /// # Errors
+    /// Returns an error if the watchdog stopped the batch. Its writes until then remain.
     pub fn run(
         &mut self,
         active: &LaneMask,

@@ -95,7 +95,8 @@ impl Latencies {
 
 /// Writes all files to a folder, which is created if it doesn't exist.
 ///
-/// # Errors Returns the error of writing a file.
+/// # Errors
+/// Returns the error of writing a file.
 pub fn write(folder: &Path) -> Result<()> {
     std::fs::create_dir_all(folder)?;
     for (name, text) in files() {
@@ -180,7 +181,8 @@ pub struct UnitBench(PathBuf);
 impl UnitBench {
     /// Compiles the units for a format in a folder, which keeps the compiled program.
     ///
-    /// # Errors Returns an error if Verilator is missing or fails.
+    /// # Errors
+    /// Returns an error if Verilator is missing or fails.
     pub fn build(folder: &Path, format: Format) -> Result<Self> {
         build(folder, "units", format, &[]).map(Self)
     }
@@ -188,7 +190,8 @@ impl UnitBench {
     /// Computes for each pair: the sum, the sum by two paths, the product, the product by Booth's digits, the quotient,
     /// and the power of the first number by the table and by the polynomial.
     ///
-    /// # Errors Returns an error if the program can't be run.
+    /// # Errors
+    /// Returns an error if the program can't be run.
     pub fn run(&self, pairs: &[[u32; 2]]) -> Result<Vec<[u32; 7]>> {
         let words = run(&self.0, pairs.as_flattened())?;
         let (results, _) = words.as_chunks();
@@ -221,7 +224,8 @@ impl ModuleBench {
     /// Compiles a module for a format in a folder, which keeps the compiled program. `parameters` are Verilator's
     /// arguments.
     ///
-    /// # Errors Returns an error if Verilator is missing or fails.
+    /// # Errors
+    /// Returns an error if Verilator is missing or fails.
     pub fn build(folder: &Path, format: Format, parameters: &[String]) -> Result<Self> {
         let program = build(folder, "raster_module", format, parameters)?;
         Ok(Self { program, format })
@@ -230,7 +234,8 @@ impl ModuleBench {
     /// Draws lists one after the other on a module. Memory answers a request that was not made ahead after `latency`
     /// cycles.
     ///
-    /// # Errors Returns an error if the program can't be run.
+    /// # Errors
+    /// Returns an error if the program can't be run.
     pub fn run(&self, lists: &[List], module: &Module, latency: u32) -> Result<Rasterized> {
         let thresholds = &module.thresholds;
         let mut words = vec![

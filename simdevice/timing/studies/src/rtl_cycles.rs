@@ -71,7 +71,8 @@ pub struct Cycles {
 impl Cycles {
     /// Runs the module and the model.
     ///
-    /// # Errors Returns an error if the bench can't be run.
+    /// # Errors
+    /// Returns an error if the bench can't be run.
     pub fn of(
         bench: &ModuleBench,
         setting: Setting,

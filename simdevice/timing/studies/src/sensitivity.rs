@@ -115,7 +115,8 @@ fn points(frame: &FrameWork, field: &str, values: &[f64]) -> Result<Vec<Point>, 
 
 /// All sweeps over the scene.
 ///
-/// # Errors Returns a [`ConfigError`] if a preset can't be read.
+/// # Errors
+/// Returns a [`ConfigError`] if a preset can't be read.
 pub fn sweeps(frame: &FrameWork) -> Result<Vec<Sweep>, ConfigError> {
     let paper = machine(&[])?;
     Ok(vec![
@@ -308,7 +309,8 @@ fn precision(frame: &FrameWork) -> Result<Sweep, ConfigError> {
 
 /// The text of SENSITIVITY.md.
 ///
-/// # Errors Returns a [`ConfigError`] if a preset can't be read.
+/// # Errors
+/// Returns a [`ConfigError`] if a preset can't be read.
 pub fn markdown() -> Result<String, ConfigError> {
     let frame = frame();
     let draw = &frame.draws[0];

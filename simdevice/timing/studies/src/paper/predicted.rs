@@ -65,7 +65,8 @@ fn mean(values: impl Iterator<Item = f64>) -> f64 {
 
 /// The section of predicted frame rates and speed-ups.
 ///
-/// # Errors Returns a [`ConfigError`] if the preset can't be read.
+/// # Errors
+/// Returns a [`ConfigError`] if the preset can't be read.
 pub fn section() -> Result<Section, ConfigError> {
     let config = Config::preset(DEFAULT_PRESET, &[])?;
     let mut rows = Vec::new();

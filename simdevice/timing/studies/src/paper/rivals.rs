@@ -11,7 +11,8 @@ use timing::work::FrameWork;
 
 /// The sections about the SIMT machine, the traffic of sorting, and other ways to draw Gaussians.
 ///
-/// # Errors Returns a [`ConfigError`] if the preset can't be read.
+/// # Errors
+/// Returns a [`ConfigError`] if the preset can't be read.
 pub fn sections() -> Result<[Section; 3], ConfigError> {
     let config = Config::preset(DEFAULT_PRESET, &[])?;
     Ok([baseline(&config), sorting(&config), others(&config)])
