@@ -351,7 +351,7 @@ pub(crate) fn get_device_group_peer_memory_features() -> Result<vk::PeerMemoryFe
     Ok(vk::PeerMemoryFeatureFlags::empty())
 }
 
-/// Does nothing: counters are always on and shared by nobody.
+/// Does nothing: counters are always on, and nothing else can use them.
 #[doc(alias = "vkAcquireProfilingLockKHR")]
 pub(crate) fn acquire_profiling_lock(_device: &Device) -> Result<(), Error> {
     Ok(())

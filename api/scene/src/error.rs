@@ -56,7 +56,7 @@ pub enum Place {
     Byte(u64),
     /// The header, or a field of it.
     Header(&'static str),
-    /// An entry of an archive, or a file beside the one that names it.
+    /// An entry of an archive, or a file that another one names.
     Entry(String),
     /// A part of a JSON document.
     Part(String),

@@ -1,4 +1,4 @@
-//! Declarations of ash and of gaurast: the Rust names and types of the registry's things.
+//! Declarations of ash and of gaurast: the Rust names and types of the registry's structures and commands.
 
 use crate::error::Error;
 use crate::file::File;

@@ -56,7 +56,7 @@ pub enum Error {
     /// An entry point contradicts the registry.
     #[error("driver/src: {0}")]
     EntryPoint(String),
-    /// Neither ash nor gaurast declares a thing of the registry.
+    /// Neither ash nor gaurast declares a structure or command of the registry.
     #[error("ash declares no {0}")]
     Undeclared(String),
 }

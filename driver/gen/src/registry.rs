@@ -101,7 +101,7 @@ pub struct Extension {
     pub promoted_to: Option<String>,
     /// The condition under which it may be supported.
     pub depends: Option<String>,
-    /// The things that it requires.
+    /// The types, commands and features that it requires.
     pub requirements: Vec<Requirement<()>>,
 }
 
@@ -276,7 +276,7 @@ pub(crate) fn read(path: &Path) -> Result<String, Error> {
     })
 }
 
-/// Reports whether a list of APIs contains Vulkan; without a list, a thing belongs to all APIs.
+/// Reports whether a list of APIs contains Vulkan. Without a list, an element belongs to all APIs.
 fn is_of_vulkan(apis: Option<&str>) -> bool {
     apis.is_none_or(|apis| apis.split(',').any(|api| api == "vulkan"))
 }

@@ -47,7 +47,7 @@ pub unsafe extern "system" fn vk_icdGetInstanceProcAddr(
     interface.or_else(|| unsafe { loader::get_instance_proc_addr(instance, name) })
 }
 
-/// Finds commands whose first parameter is a physical device, so that the loader passes on those that it doesn't know.
+/// Finds commands whose first parameter is a physical device, so that the loader forwards those that it doesn't know.
 ///
 /// # Safety
 /// `instance` is valid, and `name` is a string.

@@ -61,9 +61,9 @@ pub enum Error {
     /// The module has no such entry point.
     #[error("the module has no {stage} entry point named \"{name}\"")]
     NoEntryPoint {
-        /// The name asked for.
+        /// The requested name.
         name: String,
-        /// The stage asked for.
+        /// The requested stage.
         stage: Stage,
     },
     /// A specialization constant is given a value of the wrong size.

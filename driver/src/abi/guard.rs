@@ -155,7 +155,7 @@ mod register {
     pub(super) type Bits = u32;
     /// All bits except the flags of exceptions that have occurred.
     pub(super) const MODES: Bits = 0xffc0;
-    /// All exceptions are masked.
+    /// The register with all exceptions masked.
     pub(super) const DEFAULT: Bits = 0x1f80;
 
     pub(super) fn read() -> Bits {
@@ -177,7 +177,7 @@ mod register {
 
     pub(super) type Bits = u64;
     pub(super) const MODES: Bits = !0;
-    /// No exception is trapped.
+    /// The register with no exception trapped.
     pub(super) const DEFAULT: Bits = 0;
 
     pub(super) fn read() -> Bits {

@@ -68,7 +68,7 @@ pub(crate) fn cmd_draw_indexed(
 /// The elements of an array that lie `stride` bytes apart.
 ///
 /// # Safety
-/// There are `count` of them at the pointer.
+/// The pointer has `count` elements, `stride` bytes apart.
 unsafe fn strided<T: Copy>(first: *const T, count: u32, stride: u32) -> Result<Vec<T>, Error> {
     if first.is_null() && count > 0 {
         return Err(Error::NullPointer {

@@ -78,14 +78,14 @@ fn write_trace(file: &Path, trace: &Trace) {
     }
 }
 
-/// The things that are printed for readers.
+/// The texts that are printed for readers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Dump {
     /// True to print the device's programs when pipelines are created.
     pub(crate) ir: bool,
 }
 
-/// The things that the environment asks to print.
+/// The texts that the environment asks to print.
 ///
 /// # Errors
 /// [`Error::InitializationFailed`] for an unknown name.

@@ -20,7 +20,7 @@ use std::collections::HashMap;
 /// The outputs of a pipeline's programs that have an effect, and the other state that changes linking.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct LiveOutputs<'a> {
-    /// By colour attachment: true if the attachment is written, or its source's alpha is used.
+    /// True for each colour attachment that is written, or whose source's alpha is used.
     pub(crate) color: &'a [bool],
     /// True if the second source of blending is read.
     pub(crate) second_source: bool,

@@ -15,7 +15,7 @@ pub const PAGE_SIZE: u64 = 4096;
 #[derive(Debug, thiserror::Error)]
 #[error("the host cannot back {size} bytes of device memory: {source}")]
 pub struct AllocationError {
-    /// The length asked for in bytes.
+    /// The requested length in bytes.
     pub size: u64,
     /// The host's error.
     #[source]
@@ -140,7 +140,7 @@ impl Allocation {
         self.derived.lock().retain(|kept| !Arc::ptr_eq(kept, data));
     }
 
-    /// The address of byte 0, for the application that maps this memory; valid while the allocation lives.
+    /// The address of byte 0, for the application that maps this memory; valid as long as the allocation exists.
     pub fn host_pointer(&self) -> *mut u8 {
         self.map.as_mut_ptr()
     }

@@ -119,7 +119,7 @@ pub enum LodRequest {
 /// A sample for 16 lanes: four quads, in order.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SampleRequest {
-    /// Lanes whose result is wanted, lane 0 lowest. The coordinates of the others still count for differences.
+    /// The lanes whose result is used, lane 0 lowest. The coordinates of other lanes are still used for differences.
     pub mask: u16,
     /// The image's kind.
     pub shape: ImageShape,
@@ -138,7 +138,7 @@ pub struct SampleRequest {
 /// An unfiltered access for 16 lanes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TexelRequest {
-    /// Lanes that take part, lane 0 lowest.
+    /// The lanes that access a texel, lane 0 lowest.
     pub mask: u16,
     /// The image's kind.
     pub shape: ImageShape,

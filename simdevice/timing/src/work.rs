@@ -244,7 +244,7 @@ pub struct TileWork {
     /// shrink. Hierarchical depth ends the list before them.
     #[serde(default)]
     pub hidden_rest: u32,
-    /// Quads of 2x2 pixels that went to fragment programs.
+    /// Quads of 2x2 pixels that fragment programs shaded.
     #[serde(default)]
     pub quads: u32,
     /// Quads that were covered but failed early tests in every pixel. Quads of hidden primitives are not counted.

@@ -363,7 +363,7 @@ fn ldexp64(a: f64, exponent: i32) -> f64 {
         return a;
     }
     let total = own.saturating_add(exponent);
-    // The last factor alone may round: it brings a normal number into the denormal range.
+    // Only the last factor rounds: it moves a normal number into the denormal range.
     if total > 1024 {
         significand * f64::MAX * 4.0
     } else if total >= -1021 {

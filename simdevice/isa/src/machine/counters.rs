@@ -10,7 +10,7 @@ pub struct Work {
     pub batches: u64,
     /// Instructions executed by [`Kind`], each counted once for a batch.
     pub instructions: [u64; Kind::COUNT],
-    /// Of them, those computed once for all lanes.
+    /// The instructions among them that were computed once for all lanes.
     pub uniform_instructions: [u64; Kind::COUNT],
     /// Lanes active over the instructions that work on each lane.
     pub active_lanes: u64,
@@ -39,7 +39,8 @@ impl Work {
         }
     }
 
-    /// Adds a straight run that was executed some times, with so many active lanes altogether.
+    /// Adds the instructions of a counted run that was executed `executions` times, with `active` active lanes in
+    /// total.
     pub(super) fn add_run(&mut self, cost: &RunCost, executions: u64, active: u64, lanes: usize) {
         let mut varying = 0;
         for kind in 0..Kind::COUNT {

@@ -9,7 +9,7 @@ use crate::ir::{
 };
 use crate::resources::{LaneWords, LodRequest, SampleRequest, TexelRequest};
 
-/// The bind point that stands for none.
+/// The bind point that means none.
 const UNBOUND: u32 = u32::MAX;
 
 fn words(batch: &Batch<'_>, reg: Reg, vector: usize) -> LaneWords {

@@ -773,7 +773,7 @@ impl Access<'_> {
 
 // Private memory of each lane. A word of it is a row of vectors, as a varying register is.
 
-/// The row that stands for a word that doesn't exist.
+/// The row that means a word that doesn't exist.
 const NOWHERE: usize = usize::MAX;
 
 /// The rows that 16 lanes access.

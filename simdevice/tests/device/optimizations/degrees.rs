@@ -58,7 +58,7 @@ fn what_has_no_room_for_coefficients_takes_the_rest() {
     let degrees = [0, 0, 2, 2, 0, 2];
     let expected = [false, true, false, false, false, false];
     assert_eq!(built(SCARCE, &degrees), expected);
-    // What has room makes them once more, for both.
+    // The coefficients of degree 0 fit into the budget, so its draws make chunks again, which then serve both degrees.
     let degrees = [2, 2, 0, 0, 2, 0, 2];
     let expected = [false, true, false, true, false, false, false];
     assert_eq!(built(SCARCE, &degrees), expected);
