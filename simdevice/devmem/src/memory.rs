@@ -270,7 +270,7 @@ macro_rules! atomics {
                     Some(())
                 }
 
-                #[doc = concat!("Replaces the `", stringify!($int), "` at byte `offset` by `change` of it, atomically, and returns what was there.")]
+                #[doc = concat!("Replaces the `", stringify!($int), "` at byte `offset` by its `change`, atomically; returns the old value.")]
                 pub fn $update(&self, offset: u64, mut change: impl FnMut($int) -> $int) -> Option<$int> {
                     let cell = self.$at(offset)?;
                     let mut old = cell.load(Ordering::Relaxed);
@@ -282,12 +282,12 @@ macro_rules! atomics {
                     }
                 }
 
-                #[doc = concat!("Exchanges the `", stringify!($int), "` at byte `offset` and returns what was there.")]
+                #[doc = concat!("Exchanges the `", stringify!($int), "` at byte `offset`; returns the old value.")]
                 pub fn $exchange(&self, offset: u64, value: $int) -> Option<$int> {
                     Some(self.$at(offset)?.swap(value, Ordering::Relaxed))
                 }
 
-                #[doc = concat!("Stores `value` at byte `offset` if the `", stringify!($int), "` there is `expected`; returns what was there.")]
+                #[doc = concat!("Stores `value` at byte `offset` if the `", stringify!($int), "` there is `expected`; returns the old value.")]
                 pub fn $compare_exchange(&self, offset: u64, expected: $int, value: $int) -> Option<$int> {
                     let (Ok(old) | Err(old)) = self.$at(offset)?.compare_exchange(expected, value, Ordering::Relaxed, Ordering::Relaxed);
                     Some(old)

@@ -1,6 +1,6 @@
-// A processing element. One pixel may begin in each cycle, in the mode of all that are on their way. It has 9 adders,
-// 9 multipliers and a divider for triangles; GAUSSIANS adds 2 adders, a multiplier, an exponential and what chooses their
-// operands. Numbers and a pixel's own values come when they are used: see latencies.svh.
+// A processing element. A pixel may begin in each cycle, in the mode of all pixels in the pipeline. It has 9 adders,
+// 9 multipliers and a divider for triangles; GAUSSIANS adds 2 adders, a multiplier, an exponential and the multiplexers
+// of their operands. Numbers and a pixel's values arrive when they are used: see latencies.svh.
 //
 //            numbers of a triangle            numbers of a Gaussian
 //   0..2     plane of u/w: x, y, constant     exponent of dx^2, of dx dy, mean x
@@ -21,23 +21,23 @@ module pe #(
     input  logic [EXPONENT+MANTISSA:0] x,
     input  logic [EXPONENT+MANTISSA:0] y,
     input  logic [9*(1+EXPONENT+MANTISSA)-1:0] numbers,
-    // Of the draw.
+    // Parameters of the draw.
     input  logic [EXPONENT+MANTISSA:0] depth_offset,
     input  logic [EXPONENT+MANTISSA:0] depth_scale,
     input  logic [EXPONENT+MANTISSA:0] alpha_floor,
     input  logic [EXPONENT+MANTISSA:0] alpha_ceiling,
     input  logic [EXPONENT+MANTISSA:0] transmittance_floor,
-    // Of the pixel: at READ, and an addition before GAUSSIAN.
+    // The pixel's values: at READ, and an addition before GAUSSIAN.
     input  logic [EXPONENT+MANTISSA:0] transmittance,
     input  logic [3*(1+EXPONENT+MANTISSA)-1:0] color,
     // At TRIANGLE: u, v and depth, from the lowest bits up.
     output logic [3*(1+EXPONENT+MANTISSA)-1:0] fragment,
     output logic covered,
-    // At WRITE: whether alpha reaches its floor, whether the pixel stays open, and what is left of its transmittance.
+    // At WRITE: whether alpha reaches its floor, whether the pixel stays unfinished, and its new transmittance.
     output logic reaches,
     output logic open,
     output logic [EXPONENT+MANTISSA:0] next_transmittance,
-    // At GAUSSIAN.
+    // At GAUSSIAN: the new colour.
     output logic [3*(1+EXPONENT+MANTISSA)-1:0] next_color
 );
     `include "latencies.svh"
@@ -73,7 +73,7 @@ module pe #(
     assign {m8, m7, m6, m5, m4, m3, m2, m1, m0} = products;
     assign {a8, a7, a6, a5, a4, a3, a2, a1, a0} = sums;
 
-    // Triangles: the reciprocal of 1/w, and what waits for it and for the third weight.
+    // Triangles: the reciprocal of 1/w, and the values delayed for it and for the third weight.
     logic [BITS-1:0] w, u_over_w, v_over_w, v_weight, u, v, depth;
     fp_div #(.EXPONENT(EXPONENT), .MANTISSA(MANTISSA)) divider (.clk(clk), .a(ONE), .b(a5), .quotient(w));
     delay #(.WIDTH(2 * BITS), .CYCLES(DIV)) for_w (.clk(clk), .in({a3, a1}), .out({v_over_w, u_over_w}));
@@ -82,10 +82,10 @@ module pe #(
     delay #(.WIDTH(BITS), .CYCLES(2 * ADD)) u_late (.clk(clk), .in(m6), .out(u));
     delay #(.WIDTH(BITS), .CYCLES(DIV + ADD)) depth_late (.clk(clk), .in(a8), .out(depth));
     assign fragment = {depth, v, u};
-    // Coverage is in the signs of the three weights.
+    // The signs of the three weights tell whether the pixel is covered.
     assign covered = !u[BITS-1] && !v[BITS-1] && !a7[BITS-1];
 
-    // Gaussians: their own units, and what waits for others.
+    // Gaussians: their own units, and the values delayed for others.
     logic [BITS-1:0] dx, dy, dx_late, dy_late, second, alpha, alpha_late, green;
     generate
         if (GAUSSIANS != 0) begin : gaussians
@@ -101,7 +101,7 @@ module pe #(
             delay #(.WIDTH(BITS), .CYCLES(MUL + ADD)) dx_waits (.clk(clk), .in(dx), .out(dx_late));
             delay #(.WIDTH(BITS), .CYCLES(MUL)) dy_waits (.clk(clk), .in(dy), .out(dy_late));
             delay #(.WIDTH(BITS), .CYCLES(ADD)) second_waits (.clk(clk), .in(m4), .out(second));
-            // Both are positive, so that they compare as integers.
+            // Both are positive, so they compare as integers.
             assign alpha = power > alpha_ceiling ? alpha_ceiling : power;
             delay #(.WIDTH(BITS), .CYCLES(ADD)) alpha_waits (.clk(clk), .in(alpha), .out(alpha_late));
             delay #(.WIDTH(BITS), .CYCLES(ADD)) rest_waits (.clk(clk), .in(m7), .out(next_transmittance));
@@ -115,7 +115,7 @@ module pe #(
     assign open = !a6[BITS-1];
     assign next_color = {a7, a2, a8};
 
-    // Who computes what in which mode.
+    // The computation of each unit in each mode.
     //                     Gaussian                       triangle
     assign ma0 = n0;
     assign mb0 = g ? dx : x;
