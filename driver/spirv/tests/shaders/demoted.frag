@@ -4,6 +4,6 @@ layout(location = 0) in vec4 carried;
 layout(location = 0) out vec4 color;
 void main() {
     if (int(gl_FragCoord.x) % 2 == 1) demote;
-    // The neighbour that was demoted still takes part.
+    // The demoted neighbour still computes, for derivatives.
     color = vec4(dFdx(gl_FragCoord.x), carried.yzw);
 }

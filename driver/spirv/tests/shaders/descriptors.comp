@@ -1,4 +1,4 @@
-// Adds what four storage buffers, picked at run time, and two uniform buffers hold.
+// Adds the contents of four storage buffers, selected at run time, and two uniform buffers.
 #version 450
 layout(local_size_x = 16) in;
 layout(set = 0, binding = 0) readonly buffer In { uint values[]; } sources[4];

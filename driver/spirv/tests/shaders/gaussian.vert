@@ -1,5 +1,5 @@
 #version 450
-// What fixed-function projection does, in a vertex shader: a pinhole and spherical harmonics of degree 3.
+// Fixed-function projection as a vertex shader: a pinhole camera and spherical harmonics of degree 3.
 
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 scale;

@@ -1,4 +1,4 @@
-// Each workgroup notes its number and how many there are; each invocation its own number within.
+// Each workgroup stores its index and the number of workgroups; each invocation stores its local index.
 #version 450
 layout(local_size_x = 3, local_size_y = 2, local_size_z = 2) in;
 layout(set = 0, binding = 0) buffer Out { uint next; uint pad[3]; uvec4 values[]; } target;

@@ -1,4 +1,4 @@
-// Reads and writes far outside of what is bound.
+// Reads and writes far outside of the bound buffers.
 #version 450
 layout(local_size_x = 32) in;
 layout(set = 0, binding = 0) buffer Small { uint values[]; } data;

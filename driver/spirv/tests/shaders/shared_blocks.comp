@@ -2,7 +2,7 @@
 #extension GL_EXT_shared_memory_block : require
 #extension GL_EXT_shader_explicit_arithmetic_types_int16 : require
 #extension GL_EXT_shader_explicit_arithmetic_types_int8 : require
-// Blocks of shared memory lie in one place.
+// Blocks of shared memory alias each other.
 layout(local_size_x = 64) in;
 shared Words { uint words[64]; };
 shared Halves { layout(offset = 4) uint16_t halves[126]; };
@@ -12,7 +12,7 @@ void main() {
     uint i = gl_LocalInvocationIndex;
     words[i] = 0x10203u * (i + 1u);
     barrier();
-    // The upper half of the word after the next one's.
+    // The upper half of the next word but one.
     results[i] = uint(halves[min(2u * i + 1u, 125u)]);
     results[64 + i] = uint(bytes[4u * i + 1u]);
     barrier();

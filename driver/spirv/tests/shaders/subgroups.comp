@@ -1,4 +1,4 @@
-// What the invocations of a subgroup know of each other.
+// Built-ins and operations by which the invocations of a subgroup see each other.
 #version 450
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_arithmetic : require

@@ -6,7 +6,7 @@
 layout(location = 0) in vec4 value;
 layout(location = 0) out vec4 color;
 void main() {
-    // The derivative of what is computed where the whole quad is.
+    // The derivative is taken where the whole quad is active.
     bool uniform_here = subgroupQuadBroadcast(1u, 0u) == 1u;
     uvec4 ballot = subgroupBallot(uniform_here);
     float right = subgroupQuadSwapHorizontal(gl_FragCoord.x);

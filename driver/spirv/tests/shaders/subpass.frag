@@ -1,5 +1,5 @@
 #version 460
-// What an earlier subpass left at this pixel: colour with green and blue exchanged, and depth for alpha.
+// The results of an earlier subpass at this pixel: colour with green and blue exchanged, and depth for alpha.
 layout(input_attachment_index = 0, binding = 0) uniform subpassInput first;
 layout(input_attachment_index = 1, binding = 1) uniform subpassInput depth;
 layout(location = 0) out vec4 color;

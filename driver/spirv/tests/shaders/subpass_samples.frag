@@ -1,5 +1,5 @@
 #version 460
-// The difference of two samples that an earlier subpass left at this pixel, and their product.
+// The difference and the product of two samples of an earlier subpass at this pixel.
 layout(input_attachment_index = 0, binding = 0) uniform subpassInputMS first;
 layout(location = 0) out vec4 color;
 void main() {

@@ -1,5 +1,5 @@
 #version 450
-// A resolve shader: maps tones, and shows depths and places.
+// A resolve shader that maps tones, and outputs depths and pixel positions.
 
 layout(location = 2) in vec4 accumulated;
 layout(location = 5) in vec2 depths;

@@ -1,5 +1,5 @@
 #version 450
-// The depth breaks the promise that it is the primitive's.
+// Writes a depth that breaks the promise of being the primitive's.
 layout(depth_unchanged) out float gl_FragDepth;
 layout(location = 0) in vec4 value;
 layout(location = 0) out vec4 color;

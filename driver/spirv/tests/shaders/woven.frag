@@ -1,5 +1,5 @@
 #version 450
-// A resolve shader that leaves out every other pixel, and shows what differs from pixel to pixel.
+// A resolve shader that discards every other pixel, and outputs derivatives.
 
 layout(location = 0) in vec4 accumulated;
 layout(location = 0) out vec4 color;
