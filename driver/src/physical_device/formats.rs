@@ -107,13 +107,14 @@ fn is_atomic(format: Format) -> bool {
     format.is_integer() && format.texel_size() == 4 && format.components().len() == 1
 }
 
-/// Reports whether a colour format can be rendered to. Formats of three equal components can't, as on other hardware.
+/// Reports whether a colour format can be rendered to. Formats of three equal components can't, as on other hardware;
+/// neither can a shared exponent.
 fn is_rendered(format: Format) -> bool {
     format.numeric() != Numeric::SharedExponent && format.texel_size().is_power_of_two()
 }
 
-/// The features of buffers of the format. Any colour format can be a vertex attribute, unless a component's value
-/// depends on more than its own bits. Programs can read texels of any format.
+/// The features of buffers of the format. Any colour format can be a vertex attribute, except sRGB and shared exponents.
+/// Programs can read texels of any format that isn't scaled or compressed.
 fn buffer_features(format: Format) -> vk::FormatFeatureFlags {
     if !is_color(format) || is_compressed(format) {
         return vk::FormatFeatureFlags::empty();
