@@ -2,8 +2,8 @@
 //! rounding mode that Rust assumes.
 //!
 //! The functions that Vulkan calls are generated (`dispatch/commands.rs`, by `driver/gen`). Each is this guard around a
-//! conversion of its parameters and a call of one function of the driver. That function has a `#[doc(alias =
-//! "vkCreateBuffer")]`, by which the generator and readers find it. Parameters and results are converted:
+//! conversion of its parameters and a call of one function of the driver. The generator and readers find that function by
+//! its alias, such as `#[doc(alias = "vkCreateBuffer")]`. Parameters and results are converted:
 //! - handles become objects through [`handle`](crate::abi::handle), pointers and chains become references through
 //!   [`valid`](crate::abi::valid);
 //! - `Ok(())` is `VK_SUCCESS`, another success code is `Ok(vk::Result)`, and an error is logged, sent to the instance's
