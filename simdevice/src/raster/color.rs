@@ -366,34 +366,40 @@ impl ColorOutput {
         }
     }
 
-    /// The blend equations.
-    #[inline(always)]
+    /// Blends by the equations, of which there are too many for a copy of the code wherever colours are written.
+    #[inline(never)]
     fn blend<S: Simd>(
         &self,
         simd: S,
-        (color, alpha): (BlendEquation, BlendEquation),
+        equations: (BlendEquation, BlendEquation),
         source: &Colors<S>,
         second: &Colors<S>,
         destination: &Colors<S>,
     ) -> Colors<S> {
-        let (mut source, mut second) = (*source, *second);
-        if let Some((low, high)) = self.range {
-            for component in source.iter_mut().chain(&mut second) {
-                *component = clamp(simd, *component, low, high);
-            }
-        }
-        let operands = Operands {
-            source,
-            second,
-            destination: *destination,
-            constants: self.constants,
-        };
-        [
-            operands.evaluate(simd, color, 0),
-            operands.evaluate(simd, color, 1),
-            operands.evaluate(simd, color, 2),
-            operands.evaluate(simd, alpha, 3),
-        ]
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let (mut source, mut second) = (*source, *second);
+                if let Some((low, high)) = self.range {
+                    for component in source.iter_mut().chain(&mut second) {
+                        *component = clamp(simd, *component, low, high);
+                    }
+                }
+                let operands = Operands {
+                    source,
+                    second,
+                    destination: *destination,
+                    constants: self.constants,
+                };
+                let (color, alpha) = equations;
+                let mut blended = source;
+                for (component, value) in blended.iter_mut().enumerate() {
+                    let equation = if component == 3 { alpha } else { color };
+                    *value = operands.evaluate(simd, equation, component);
+                }
+                blended
+            },
+        )
     }
 }
 
