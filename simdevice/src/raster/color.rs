@@ -168,7 +168,7 @@ impl ColorOutput {
                     let stored = u32x16::simd_from(simd, quads.load(words));
                     let destination = unpack_unorm8(simd, stored, bgra);
                     if let Some(over) = self.over {
-                        let blended = blend_over(simd, over, source, &destination);
+                        let blended = blend_over_in_range(simd, over, source, &destination);
                         packed = pack_unorm8_in_range(simd, &blended, bgra);
                     } else {
                         let blended = self.blend(simd, equations, source, second, &destination);
@@ -224,7 +224,7 @@ impl ColorOutput {
                     Some(over) => {
                         let stored = u32x16::simd_from(simd, *texels);
                         let destination = unpack_unorm8(simd, stored, bgra);
-                        let blended = blend_over(simd, over, &source, &destination);
+                        let blended = blend_over_in_range(simd, over, &source, &destination);
                         pack_unorm8_in_range(simd, &blended, bgra)
                     }
                 };
@@ -371,29 +371,51 @@ impl ColorOutput {
     fn blend<S: Simd>(
         &self,
         simd: S,
-        (color, alpha): (BlendEquation, BlendEquation),
+        equations: (BlendEquation, BlendEquation),
         source: &Colors<S>,
         second: &Colors<S>,
         destination: &Colors<S>,
     ) -> Colors<S> {
-        let (mut source, mut second) = (*source, *second);
-        if let Some((low, high)) = self.range {
-            for component in source.iter_mut().chain(&mut second) {
-                *component = clamp(simd, *component, low, high);
-            }
+        match self.over {
+            Some(over) if self.range.is_none() => blend_over(simd, over, source, destination),
+            _ => self.blend_by_any(simd, equations, *source, *second, *destination),
         }
-        let operands = Operands {
-            source,
-            second,
-            destination: *destination,
-            constants: self.constants,
-        };
-        [
-            operands.evaluate(simd, color, 0),
-            operands.evaluate(simd, color, 1),
-            operands.evaluate(simd, color, 2),
-            operands.evaluate(simd, alpha, 3),
-        ]
+    }
+
+    /// Blends by any equations. They are so many that this is compiled once a SIMD level, not wherever colours are written.
+    #[inline(never)]
+    fn blend_by_any<S: Simd>(
+        &self,
+        simd: S,
+        equations: (BlendEquation, BlendEquation),
+        source: Colors<S>,
+        second: Colors<S>,
+        destination: Colors<S>,
+    ) -> Colors<S> {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let (mut source, mut second) = (source, second);
+                if let Some((low, high)) = self.range {
+                    for component in source.iter_mut().chain(&mut second) {
+                        *component = clamp(simd, *component, low, high);
+                    }
+                }
+                let operands = Operands {
+                    source,
+                    second,
+                    destination,
+                    constants: self.constants,
+                };
+                let (color, alpha) = equations;
+                let mut blended = source;
+                for (component, value) in blended.iter_mut().enumerate() {
+                    let equation = if component == 3 { alpha } else { color };
+                    *value = operands.evaluate(simd, equation, component);
+                }
+                blended
+            },
+        )
     }
 }
 
@@ -504,6 +526,28 @@ impl<S: Simd> Operands<S> {
 /// Blends components of 0 to 1 by equations of which there is a kernel; exceeds that only by rounding. What is stored has
 /// the bits that [`ColorOutput::blend`] leads to.
 #[inline(always)]
+fn blend_over_in_range<S: Simd>(
+    simd: S,
+    over: Over,
+    source: &Colors<S>,
+    destination: &Colors<S>,
+) -> Colors<S> {
+    let mut source = *source;
+    for component in &mut source {
+        *component = clamp(simd, *component, 0.0, 1.0);
+    }
+    let mut blended = blend_over(simd, over, &source, destination);
+    if over == Over::Premultiplied {
+        // The source may be brighter than its alpha allows.
+        for component in &mut blended {
+            *component = component.min(1.0);
+        }
+    }
+    blended
+}
+
+/// Blends by equations of which there is a kernel.
+#[inline(always)]
 fn blend_over<S: Simd>(
     simd: S,
     over: Over,
@@ -511,15 +555,11 @@ fn blend_over<S: Simd>(
     destination: &Colors<S>,
 ) -> Colors<S> {
     let mut blended = *source;
-    for component in &mut blended {
-        *component = clamp(simd, *component, 0.0, 1.0);
-    }
-    let alpha = blended[3];
+    let alpha = source[3];
     let rest = f32x16::splat(simd, 1.0) - alpha;
     for (component, destination) in blended.iter_mut().zip(destination) {
         *component = match over {
-            // The source may be brighter than its alpha allows.
-            Over::Premultiplied => (*component + *destination * rest).min(1.0),
+            Over::Premultiplied => *component + *destination * rest,
             Over::Straight => *component * alpha + *destination * rest,
         };
     }
