@@ -28,7 +28,7 @@ pub enum AddressMode {
     /// The image repeats.
     #[default]
     Repeat,
-    /// The image repeats, every other time mirrored.
+    /// The image repeats, and every second copy is mirrored.
     MirroredRepeat,
     /// The texel at the edge is repeated.
     ClampToEdge,
@@ -64,12 +64,12 @@ impl BorderColor {
 /// The reduction of the texels that a filter reads.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Reduction {
-    /// Their weighted mean.
+    /// The weighted mean.
     #[default]
     WeightedAverage,
-    /// The least of those that have a weight, component by component.
+    /// The least of the texels with a weight, component by component.
     Min,
-    /// The greatest of those that have a weight, component by component.
+    /// The greatest of the texels with a weight, component by component.
     Max,
 }
 

@@ -80,7 +80,7 @@ fn a_gather_begins_lower_left_and_goes_round() {
         |_, _, [x, y, _]| [x + 10 * y, 100 + x, 2, 3].map(f32::from_bits),
     );
     let table = table(image, Sampler::default());
-    // Between texels (1, 1), (2, 1), (1, 2) and (2, 2).
+    // The coordinates are between texels (1, 1), (2, 1), (1, 2) and (2, 2).
     let mut request = request(Dimension::D2, &[[0.5, 0.5, 0.0, 0.0]]);
     request.gather = Some(0);
     let one = |answer: [LaneWords; 4]| answer.map(|lanes| lanes[0]);
