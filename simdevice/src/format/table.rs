@@ -32,7 +32,7 @@ macro_rules! formats {
                 }
             }
 
-            /// Its components, least significant bits first; a texel is little-endian.
+            /// The components of the format, least significant bits first. A texel is little-endian.
             pub const fn components(self) -> &'static [Component] {
                 match self {
                     $(Self::$variant => &[$(Component { channel: Channel::$channel, bits: $bits },)+],)*

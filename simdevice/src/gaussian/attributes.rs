@@ -60,7 +60,7 @@ const WHOLE_SPAN_STRIDE: u32 = 64;
 
 /// The vertices of one group of one instance.
 pub(super) struct Group<'a> {
-    /// As many vertices as the group has lanes in use.
+    /// The vertices, as many as the group has lanes in use.
     vertices: Vertices<'a>,
     pub(super) instance: u32,
     pub(super) first_instance: u32,

@@ -33,9 +33,9 @@ struct Entry {
     is_flat: bool,
     /// The value of [`Entries::now`] when it was last drawn.
     used: u64,
-    /// Its clusters, if they were built; the memory of its positions owns them.
+    /// The clusters of the draw, if they were built. The memory of the positions owns them.
     clusters: Weak<Clusters>,
-    /// The unfinished clusters, if some pieces are built; the same memory owns them.
+    /// The unfinished clusters, if some pieces are built. The same memory owns them.
     building: Weak<Mutex<ClusterBuilder>>,
     /// The bytes that its clusters take when they are finished.
     bytes: u64,

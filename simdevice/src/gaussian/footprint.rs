@@ -122,7 +122,7 @@ impl TileFootprint {
         }
     }
 
-    /// Its rows, each with its span, which may be empty.
+    /// The rows of the footprint, each with its span, which may be empty.
     #[inline(always)]
     pub(crate) fn spans<'a>(
         &'a self,

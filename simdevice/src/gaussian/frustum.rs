@@ -56,13 +56,13 @@ const ROUNDING: f64 = 1e-12;
 /// The reason why Gaussians are not in a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Outside {
-    /// Their opacities are below the floor.
+    /// The opacities are below the floor.
     Faint,
-    /// They are not beyond the near plane.
+    /// The Gaussians are not beyond the near plane.
     Near,
-    /// They are not before the far plane.
+    /// The Gaussians are not before the far plane.
     Far,
-    /// They are to the left, right, top or bottom of the picture.
+    /// The Gaussians are to the left, right, top or bottom of the picture.
     Beside,
 }
 

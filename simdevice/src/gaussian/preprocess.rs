@@ -37,15 +37,15 @@ const GROUPS_PER_TASK: usize = 4;
 
 /// The attributes of a group of Gaussians.
 pub(super) struct Source<'a> {
-    /// The reader of their spherical harmonics.
+    /// The reader of the Gaussians' spherical harmonics.
     pub(super) reader: CoefficientReader<'a>,
     pub(super) group: Group<'a>,
     pub(super) attributes: &'a Attributes,
-    /// Their models' matrices, if they have some.
+    /// The model matrices of the Gaussians, if there are any.
     pub(super) matrices: Option<&'a Matrices>,
     /// True if all attributes are valid, so that no Gaussian is skipped because of them.
     pub(super) is_sound: bool,
-    /// Their spherical harmonics, if they are in host memory already.
+    /// The spherical harmonics of the Gaussians, if they are in host memory already.
     pub(super) harmonics: Harmonics<'a>,
     /// The frustum for culling; `None` if they are not culled.
     pub(super) frustum: Option<&'a Frustum>,

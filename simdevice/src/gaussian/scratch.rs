@@ -5,7 +5,7 @@ use super::footprint::TileFootprint;
 use super::instances::{Matrices, Placed};
 use super::lanes::{Bits, F32_LANES, GROUP, GroupF64, NO_GROUP_F64};
 
-/// If at most one lane in this many was culled, all lanes are processed.
+/// The greatest share of culled lanes at which all lanes are processed is `1 / MOST`.
 const MOST: usize = 4;
 
 /// The tile footprint of each lane, as the two words of [`TileFootprint::words`].
@@ -71,9 +71,9 @@ pub(super) struct ScreenGaussians {
     pub(super) log2_opacity: GroupF64,
     /// The elements whose exponents must be computed in binary64.
     pub(super) steep: Bits,
-    /// See [`Splat::factor`](super::splat::Splat::factor).
+    /// The factors of the exponent: see [`Splat::factor`](super::splat::Splat::factor).
     pub(super) factor: [GroupF64; 3],
-    /// See [`Ellipse`](super::footprint::Ellipse).
+    /// The half size of the ellipse's box: see [`Ellipse`](super::footprint::Ellipse).
     pub(super) half: [GroupF64; 2],
     pub(super) slope: GroupF64,
     pub(super) narrowing: GroupF64,

@@ -31,7 +31,7 @@ pub struct GaussianSet {
 /// The reasons why a set cannot be drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SortError {
-    /// It has more Gaussians than one draw can sort.
+    /// The set has more Gaussians than one draw can sort.
     #[error(
         "a sorted set of {groups} groups of Gaussians exceeds the {MAX_GROUPS} that a draw can hold"
     )]

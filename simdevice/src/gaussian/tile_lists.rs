@@ -366,7 +366,7 @@ fn written(runs: &[TileRuns]) -> usize {
 }
 
 impl TileRuns {
-    /// No runs, with capacity for about `count`.
+    /// Makes an empty list with capacity for about `count` runs.
     fn with_room(count: usize) -> Self {
         Self {
             runs: host::filled(TileRun::default(), count.max(1024)),

@@ -398,7 +398,7 @@ const OFFSET_UNITS: f64 = 16_777_216.0;
 struct Shape {
     kind: PrimitiveKind,
     corners: [[i32; 2]; 3],
-    /// See [`Primitive::offsets`].
+    /// The positions of the vertices relative to the corners: see [`Primitive::offsets`].
     offsets: [[i16; 2]; 3],
     /// The depth at the vertices.
     depth: [f32; 3],

@@ -190,7 +190,7 @@ impl SubresourceLayout {
 pub struct Image {
     /// The description.
     pub desc: ImageDesc,
-    /// Its memory.
+    /// The memory that holds the texels.
     pub memory: Arc<Allocation>,
     /// The offset of the image in the memory, in bytes.
     pub offset: u64,

@@ -611,7 +611,7 @@ impl Target {
         self.layers.len() as u32
     }
 
-    /// Its width and height in pixels.
+    /// The width and height of the attachment in pixels.
     pub fn extent(&self) -> [u32; 2] {
         self.layers
             .iter()

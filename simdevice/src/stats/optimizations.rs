@@ -54,7 +54,7 @@ optimizations! {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Optimizations(u32);
 
-/// The error that a name is not the name of an optimization.
+/// A name that is not the name of an optimization.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "{name:?} is neither all nor none nor an optimization, which are {}",

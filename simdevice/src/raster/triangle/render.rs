@@ -41,7 +41,7 @@ pub struct MacroTile {
     pub layer: u32,
     /// The column and row of the macro-tile.
     pub at: [u32; 2],
-    /// Its side in pixels.
+    /// The side of the macro-tile in pixels.
     pub size: u32,
 }
 
@@ -146,11 +146,11 @@ struct RasterPrimitive<'p> {
     primitive: &'p Primitive,
     varyings: &'p Varyings,
     setup: &'p TriangleSetup,
-    /// The number of its segment in the draw, and its number in the segment.
+    /// The number of the primitive's segment in the draw, and the primitive's number in the segment.
     place: (usize, u32),
-    /// Its record in the batch, if it has one.
+    /// The primitive's record in the batch, if it has one.
     record: Option<u16>,
-    /// Its slot among deferred primitives, if a tile is deferred for it.
+    /// The primitive's slot among deferred primitives, if a tile is deferred for it.
     slot: Option<u8>,
     range: (f32, f32),
 }
