@@ -1,4 +1,4 @@
-//! The command processor: the one match over [`Packet`].
+//! The command processor: executes packets in order, by one match over [`Packet`].
 
 use crate::compute;
 use crate::device::Device;
@@ -18,8 +18,8 @@ use isa::machine::Stopped;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
-/// Why a packet could not be executed. The command processor stays usable: nothing of the packet was done, unless the error
-/// says otherwise, and a Gaussian set or a pass that it would have ended has ended.
+/// The reasons why a packet could not be executed. Unless the reason says otherwise, nothing of the packet was done. A
+/// Gaussian set or a pass that the packet would have ended has ended. The command processor can still be used.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ExecutionError {
     /// The packet belongs in a render pass.
@@ -40,11 +40,11 @@ pub enum ExecutionError {
     /// A set is too large.
     #[error(transparent)]
     TooManyGaussians(SortError),
-    /// A program ran for too long; what it wrote until then stays written.
+    /// A program ran for too long. The memory that it wrote until then stays written.
     #[error(transparent)]
     Stopped(#[from] Stopped),
-    /// The host has no memory for what the packet asks for. What it had begun is undefined, so that nothing more may be
-    /// executed.
+    /// The host has no memory for what the packet asks for. The effect of the packet is undefined, so that no further
+    /// packet may be executed.
     #[error(transparent)]
     OutOfMemory(#[from] OutOfMemory),
 }
@@ -58,21 +58,21 @@ impl From<SortError> for ExecutionError {
     }
 }
 
-/// Executes packets in order. Dropping it in the middle of a pass drops what was not flushed.
+/// Executes packets in order. Dropping it in the middle of a pass drops the draws that were not flushed.
 #[derive(Debug)]
 pub struct CommandProcessor {
     device: Arc<Device>,
-    /// Whose work is recorded.
+    /// The number under which the recorder keeps its work.
     owner: Owner,
     counters: Counters,
     pass: Option<Pass>,
-    /// The set that was begun and has not ended, once for each view.
+    /// The set of Gaussians that was begun and has not ended, once for each view.
     gaussians: Vec<GaussianSet>,
     model: HardwareModel,
 }
 
 impl CommandProcessor {
-    /// A command processor outside of any pass, with all counters at zero.
+    /// Makes a command processor outside of any pass, with all counters at zero.
     pub fn new(device: Arc<Device>) -> Self {
         static OWNERS: AtomicU64 = AtomicU64::new(0);
         let owner = OWNERS.fetch_add(1, Relaxed);
@@ -86,17 +86,17 @@ impl CommandProcessor {
         }
     }
 
-    /// What it has counted so far.
+    /// The values of its counters so far.
     pub fn counters(&self) -> &Counters {
         &self.counters
     }
 
-    /// Whether a render pass has begun and not ended.
+    /// True if a render pass has begun and not ended.
     pub fn in_pass(&self) -> bool {
         self.pass.is_some()
     }
 
-    /// Forgets a render pass and a set of Gaussians that were begun and not ended; what was not flushed is lost.
+    /// Drops a render pass and a set of Gaussians that were begun and not ended. Draws that were not flushed are lost.
     pub fn reset(&mut self) {
         self.pass = None;
         self.gaussians.clear();
@@ -110,7 +110,7 @@ impl CommandProcessor {
         host::catch(|| self.try_execute(packet))?
     }
 
-    /// As [`CommandProcessor::execute`]; where memory is wanting it unwinds.
+    /// Executes a packet as [`CommandProcessor::execute`] does, but unwinds if the host has no memory.
     fn try_execute(&mut self, packet: &Packet) -> Result<(), ExecutionError> {
         match packet {
             Packet::CopyBuffer(copy) => self.transfer(|| transfer::copy_buffer(copy)),
@@ -198,7 +198,7 @@ impl CommandProcessor {
                     .account(self.device.runtime(), &mut self.counters, None);
                 Ok(())
             }
-            // What a query measures is what was done, not what waits.
+            // A query measures the work that was done, so draws that wait are rendered first.
             Packet::BeginQuery { pool, index } => {
                 self.flush()?;
                 if pool.kind() == QueryKind::Simulated {
@@ -217,7 +217,8 @@ impl CommandProcessor {
                         .end(self.device.runtime(), &mut self.counters, area);
                 }
                 pool.end(*index, &self.counters);
-                // The first of the queries of all views has what all of them measured; the others have nothing.
+                // In a pass with views, the first query has the result for all views; the queries of the other views
+                // have zeros.
                 for further in self.further_views() {
                     let index = index.saturating_add(further);
                     pool.begin(index, &self.counters);
@@ -256,7 +257,7 @@ impl CommandProcessor {
         }
     }
 
-    /// Sorts a set of a view and adds it to the pass.
+    /// Sorts and bins one view's set of Gaussians and adds it to the pass.
     fn gaussians(&mut self, set: GaussianSet) -> Result<(), ExecutionError> {
         let draw = gaussian::sort_and_bin(
             set,
@@ -271,7 +272,7 @@ impl CommandProcessor {
         self.draw(PassDraw::Gaussians(Box::new(draw)))
     }
 
-    /// Does what belongs outside of render passes.
+    /// Runs `work`, or fails if it would run inside a render pass.
     fn transfer(&self, work: impl FnOnce()) -> Result<(), ExecutionError> {
         if self.pass.is_some() {
             return Err(ExecutionError::InsidePass);
@@ -286,13 +287,13 @@ impl CommandProcessor {
         Ok(pass.push(draw, self.device.runtime(), &mut self.counters)?)
     }
 
-    /// The views of the pass but one, counted from 1; none without views.
+    /// The numbers, from 1, of the pass's views after the first; empty without views.
     fn further_views(&self) -> std::ops::Range<u32> {
         let views = self.pass.as_ref().map_or(1, |pass| pass.views().count());
         1..views as u32
     }
 
-    /// Points, lines or triangles, view by view.
+    /// Draws points, lines or triangles, view by view.
     fn primitives(&mut self, draw: &Draw) -> Result<(), ExecutionError> {
         let pass = self.pass.as_ref().ok_or(ExecutionError::OutsidePass)?;
         for view in pass.views() {
@@ -301,7 +302,8 @@ impl CommandProcessor {
         Ok(())
     }
 
-    /// Points, lines or triangles of a view, or of the layers that they say, part by part.
+    /// Draws points, lines or triangles to one view, or without views to the layers that the vertices name. The front
+    /// end yields the draw in parts.
     fn primitives_of_view(&mut self, draw: &Draw, view: Option<u32>) -> Result<(), ExecutionError> {
         let pass = self.pass.as_ref().ok_or(ExecutionError::OutsidePass)?;
         let surface = Surface {
@@ -330,7 +332,8 @@ impl CommandProcessor {
         Ok(())
     }
 
-    /// The time of a timestamp in nanoseconds.
+    /// The time that a timestamp holds, in nanoseconds: the host's, or the simulated hardware's if the device is
+    /// configured so.
     fn now(&mut self) -> u64 {
         if !self.device.runtime().config().simulated_timestamps {
             return host_time();
@@ -341,7 +344,7 @@ impl CommandProcessor {
         self.counters.get(Counter::SimulatedTime)
     }
 
-    /// Renders what waits in the pass, if there is one.
+    /// Renders the draws that wait in the pass, if there is one.
     fn flush(&mut self) -> Result<(), ExecutionError> {
         if let Some(pass) = &mut self.pass {
             pass.flush(self.device.runtime(), &mut self.counters)?;

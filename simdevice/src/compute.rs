@@ -1,4 +1,5 @@
-//! Dispatches: workgroups of a compute program, a batch each, run in any order by the device's workers.
+//! Dispatches: workgroups of a compute program. Each workgroup is one batch; the device's workers run them in any
+//! order.
 
 use crate::packet::Dispatch;
 use crate::program::interface::ComputeInput;
@@ -10,13 +11,14 @@ use isa::resources::Resources;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-/// How many pieces each worker's share of a dispatch is cut into, so that workers end together.
+/// The number of pieces that each worker's share of a dispatch is cut into, so that all workers end at about the same
+/// time.
 const PIECES_PER_WORKER: u64 = 16;
 
 /// Runs all workgroups of a dispatch.
 ///
 /// # Errors
-/// [`Stopped`] if one ran for too long. What was written until then stays written.
+/// [`Stopped`] if a workgroup ran for too long. The memory that was written until then stays written.
 pub(crate) fn dispatch(
     dispatch: &Dispatch,
     runtime: &Runtime,
@@ -59,14 +61,14 @@ pub(crate) fn dispatch(
     ran
 }
 
-/// How many workgroups a dispatch has; `None` if nobody could count them.
+/// The number of workgroups of a dispatch; `None` if it exceeds 64 bits.
 fn group_count(count: [u32; 3]) -> Option<u64> {
     count
         .into_iter()
         .try_fold(1u64, |product, count| product.checked_mul(count.into()))
 }
 
-/// A dispatch while workers share it.
+/// A dispatch that workers share.
 struct DispatchRun<'a> {
     dispatch: &'a Dispatch,
     resources: Resources<'a>,
@@ -74,7 +76,7 @@ struct DispatchRun<'a> {
 }
 
 impl DispatchRun<'_> {
-    /// A machine with what is the same for all workgroups.
+    /// Lends a machine and sets the inputs that are the same for all workgroups.
     fn machine(&self) -> PooledMachine<'_> {
         let mut machine = self.dispatch.program.machines.lend();
         self.set_inputs(&mut machine, |input| match input {
@@ -104,7 +106,7 @@ impl DispatchRun<'_> {
         )
     }
 
-    /// Sets the inputs for which there is a value.
+    /// Sets the inputs that `value` returns a value for.
     fn set_inputs(&self, machine: &mut Machine, value: impl Fn(ComputeInput) -> Option<u32>) {
         for (slot, input) in self.dispatch.program.inputs.iter().enumerate() {
             if let Some(value) = input.and_then(&value) {

@@ -1,4 +1,4 @@
-//! The device that a driver creates: a runtime, and what is kept of Gaussians from one picture to the next.
+//! The device that a driver creates: a runtime, and the caches of Gaussians, kept from one frame to the next.
 
 use crate::gaussian::caches::Caches;
 use crate::runtime::{Config, DeviceError, Runtime};
@@ -24,17 +24,17 @@ impl Device {
         })
     }
 
-    /// What its stages run by.
+    /// The runtime: the workers, the SIMD level and the configuration.
     pub fn runtime(&self) -> &Runtime {
         &self.runtime
     }
 
-    /// What it keeps of Gaussians.
+    /// The caches of Gaussians, which are kept from one frame to the next.
     pub fn caches(&self) -> &Caches {
         &self.caches
     }
 
-    /// The SIMD level that programs are made ready for.
+    /// The SIMD level that programs are compiled for.
     pub fn level(&self) -> Level {
         self.runtime.level()
     }

@@ -1,4 +1,4 @@
-//! The model of the hardware beside the command processor: what was recorded becomes counters.
+//! The hardware model's connection to the command processor: it turns recorded work into counters.
 
 use crate::runtime::Runtime;
 use crate::state::Rect;
@@ -8,21 +8,21 @@ use timing::FrameWork;
 use timing::config::{Config, DEFAULT_PRESET};
 use timing::simulate::simulate;
 
-/// A command processor's view of the simulated hardware, which is the paper's.
+/// Simulates the paper's hardware for the work of one command processor.
 #[derive(Debug)]
 pub(crate) struct HardwareModel {
-    /// Whose work it accounts for: other command processors' queries have models of their own.
+    /// The command processor whose work is accounted for.
     owner: Owner,
-    /// Read when it is first needed.
+    /// The hardware's configuration, read when it is first needed.
     config: Option<Config>,
-    /// Queries that are active.
+    /// The number of active queries.
     queries: u32,
-    /// The first frame of the recorder that was not accounted for.
+    /// The number of the first recorded frame that is not accounted for yet.
     next: u64,
 }
 
 impl HardwareModel {
-    /// What accounts for an owner's work.
+    /// Makes a model of the work of `owner`.
     pub(crate) fn new(owner: Owner) -> Self {
         Self {
             owner,
@@ -32,18 +32,18 @@ impl HardwareModel {
         }
     }
 
-    /// Whether what is done is accounted for.
+    /// True if work is accounted for at present.
     fn is_on(&self, runtime: &Runtime) -> bool {
         self.queries > 0 || runtime.config().simulated_timestamps
     }
 
-    /// Begins to account for what is done; `area` is the current pass's, if there is one.
+    /// Begins a query: accounts for the work from here on. `area` is the current pass's, if there is one.
     pub(crate) fn begin(&mut self, runtime: &Runtime, counters: &mut Counters, area: Option<Rect>) {
         self.account(runtime, counters, area);
         let recorder = runtime.query_recorder();
         recorder.listen();
         if !self.is_on(runtime) {
-            // What others recorded before is none of this query's.
+            // Work that was recorded before the query is not part of it.
             recorder.work_since(self.owner, &mut self.next);
         }
         self.queries += 1;
@@ -52,7 +52,7 @@ impl HardwareModel {
         }
     }
 
-    /// Ends what [`HardwareModel::begin`] began.
+    /// Ends a query that [`HardwareModel::begin`] began.
     pub(crate) fn end(&mut self, runtime: &Runtime, counters: &mut Counters, area: Option<Rect>) {
         self.account(runtime, counters, area);
         if self.queries > 0 {
@@ -61,8 +61,8 @@ impl HardwareModel {
         }
     }
 
-    /// Counts what was recorded since the last time. What a pass does from here on is a frame of its own, as its
-    /// tiles have been written: `area` is that pass's.
+    /// Adds the cost of the work that was recorded since the last call to the counters. In a pass, whose area is
+    /// `area`, the work after this call is a frame of its own, because its tiles have been written.
     pub(crate) fn account(
         &mut self,
         runtime: &Runtime,
@@ -96,10 +96,10 @@ impl HardwareModel {
     }
 }
 
-/// Adds what a frame costs.
+/// Adds the simulated time, cycles, bytes and energy of a frame.
 fn add(counters: &mut Counters, frame: &FrameWork, config: &Config) {
     use Counter as C;
-    // One frame at a time: a timestamp or counter after it has waited for all of it.
+    // Frames do not overlap, because a timestamp or query after a frame waits for all of it.
     let mut serial = config.clone();
     serial.schedule.collaborative = false;
     let result = simulate(frame, &serial);

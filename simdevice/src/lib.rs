@@ -1,13 +1,13 @@
 //! The simulated GauRast device.
 //!
-//! A device executes [`Packet`]s: its [`CommandProcessor`] is the one place that tells a Gaussian draw from a
-//! triangle draw, a copy or a clear. It computes real pixels in [`devmem`] memory and knows nothing of Vulkan;
-//! the driver lowers Vulkan state to packets.
+//! A device executes [`Packet`]s. Its [`CommandProcessor`] is the one place that tells a Gaussian draw from a triangle
+//! draw, a copy or a clear. It computes real pixels in [`devmem`] memory and does not depend on Vulkan; the driver
+//! lowers Vulkan state to packets.
 //!
 //! Data flows one way: packets -> geometry and Gaussian preprocessing -> binning -> the tile engine -> memory.
-//! [`stats::counters`] records the work that was done. A module imports only those before it: [`limits`], [`state`] and the
-//! vector helpers; [`format`] and [`stats`]; [`image`] and [`runtime`]; [`texture`]; [`program`]; [`packet`]; [`geometry`],
-//! [`compute`] and [`transfer`]; [`gaussian`]; [`raster`]; [`pass`]; [`command_processor`].
+//! [`stats::counters`] records the work that was done. A module imports only those before it: [`limits`], [`state`] and
+//! the vector helpers; [`format`] and [`stats`]; [`image`] and [`runtime`]; [`texture`]; [`program`]; [`packet`];
+//! [`geometry`], [`compute`] and [`transfer`]; [`gaussian`]; [`raster`]; [`pass`]; [`command_processor`].
 #![forbid(unsafe_code)]
 
 pub mod command_processor;

@@ -1,4 +1,5 @@
-//! Mistakes that implementations make, for a device that makes one on demand. Only the feature `mistakes` has them.
+//! Mistakes that implementations make, for tests of the conformance suite: the device makes one of them on demand. They
+//! exist only with the feature `mistakes`.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -15,7 +16,7 @@ macro_rules! mistakes {
         }
 
         impl Mistake {
-            /// All of them, and what each is.
+            /// All mistakes, each with its description.
             pub const ALL: &[(Self, &str)] = &[$((Self::$mistake, concat!($($doc),*)),)*];
         }
     };
@@ -34,9 +35,9 @@ mistakes! {
     NoCeiling,
     /// No pixel is finished early.
     NeverFinished,
-    /// What lies in the near plane is drawn.
+    /// Gaussians in the near plane are drawn.
     NearIncluded,
-    /// What lies in the far plane is drawn.
+    /// Gaussians in the far plane are drawn.
     FarIncluded,
     /// The eye is rounded to binary32.
     EyeRounded,
@@ -92,10 +93,10 @@ mistakes! {
     DirectionsOfWorld,
 }
 
-/// One more than the number of the mistake that is made, or 0.
+/// The number of the mistake that is made, plus one; 0 if none is made.
 static MADE: AtomicUsize = AtomicUsize::new(0);
 
-/// Has the device make a mistake from now on, or none.
+/// Makes the device make a mistake from now on, or none.
 pub fn make(mistake: Option<Mistake>) {
     MADE.store(
         mistake.map_or(0, |mistake| mistake as usize + 1),
@@ -104,14 +105,14 @@ pub fn make(mistake: Option<Mistake>) {
 }
 
 impl Mistake {
-    /// Reports whether this is the mistake that is made.
+    /// True if the device makes this mistake.
     #[inline]
     pub fn is_made(self) -> bool {
         MADE.load(Ordering::Relaxed) == self as usize + 1
     }
 }
 
-/// The beginning of a set, where that is mistaken.
+/// Returns the beginning of a set, changed if the mistake that is made concerns it.
 pub(crate) fn begin(begin: &GaussianBegin) -> GaussianBegin {
     let mut begin = begin.clone();
     let state = Arc::make_mut(&mut begin.state);
@@ -143,7 +144,7 @@ pub(crate) fn begin(begin: &GaussianBegin) -> GaussianBegin {
     begin
 }
 
-/// A key of more digits than binary32 has, or of fewer.
+/// Returns a sort key with more digits than binary32, or with fewer, if that mistake is made; else `key`.
 pub(crate) fn key(depth: f64, key: u32) -> u32 {
     if Mistake::KeysUnrounded.is_made() && depth > 0.0 {
         // Two more digits, for depths from 2^-63 to 2^64.

@@ -1,7 +1,7 @@
-//! The current render pass: draws are gathered, and rendered macro-tile by macro-tile when it is flushed.
+//! The current render pass. It gathers draws, and renders them macro-tile by macro-tile when it is flushed.
 //!
-//! Every macro-tile is rendered by one worker that runs all draws in submission order against its tile buffers, so
-//! that the image depends neither on the number of workers nor on when the pass is flushed.
+//! One worker renders a macro-tile: it runs all draws in submission order against its tile buffers. The image therefore
+//! depends neither on the number of workers nor on the moments at which the pass is flushed.
 
 use crate::format::{Aspect, ClearValue, Format};
 use crate::gaussian::BinnedDraw;
@@ -24,7 +24,7 @@ use isa::machine::Stopped;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-/// A draw that waits in a pass.
+/// A draw that waits in a pass to be rendered.
 #[derive(Debug)]
 pub enum PassDraw {
     /// Rectangles of attachments to clear.
@@ -36,7 +36,7 @@ pub enum PassDraw {
 }
 
 impl PassDraw {
-    /// Bytes of host memory that it holds while it waits.
+    /// The host memory that it occupies while it waits, in bytes.
     fn memory_bytes(&self) -> u64 {
         match self {
             Self::Clear(clear) => (size_of_val(&*clear.clears) + size_of_val(&*clear.rects)) as u64,
@@ -46,7 +46,7 @@ impl PassDraw {
     }
 }
 
-/// What attachments are resolved to when the pass ends.
+/// The targets that attachments are resolved to at the end of the pass.
 #[derive(Debug, Default)]
 struct Resolves {
     color: Vec<Option<Resolve>>,
@@ -54,7 +54,7 @@ struct Resolves {
     stencil: Option<Resolve>,
 }
 
-/// What an attachment is resolved to, and how.
+/// The target of a resolve, and its mode.
 type Resolve = (Target, ResolveMode);
 
 /// A render pass between its beginning and its end.
@@ -62,24 +62,24 @@ type Resolve = (Target, ResolveMode);
 pub struct Pass {
     area: Rect,
     layer_count: u32,
-    /// The layers that are views, a bit each, if any are.
+    /// The layers that are views, one bit each; 0 if none is.
     view_mask: u32,
     color: Vec<Option<Target>>,
     depth: Option<Target>,
     stencil: Option<Target>,
-    /// What the colour attachments, depth and stencil are resolved to.
+    /// The targets that the attachments are resolved to.
     resolve: Resolves,
-    /// Samples per pixel of the attachments, if there are any.
+    /// The samples per pixel of the attachments, if there are any attachments.
     samples: Option<u32>,
     draws: Vec<PassDraw>,
-    /// How many draws there were, those included that do not wait any more.
+    /// The number of draws so far, including those that were flushed.
     pushed: u64,
     bin_bytes: u64,
 }
 
-/// Whether [`FlushPolicy::SomeDraws`] flushes after a draw: one in three, without a pattern.
+/// True if [`FlushPolicy::SomeDraws`] flushes after this draw: after about one draw in three, pseudo-randomly.
 fn flushes(seed: u64, draw: u64) -> bool {
-    // Multiplication by an odd constant mixes upwards.
+    // Multiplication by an odd constant carries low bits into high bits.
     let mixed =
         (seed ^ draw.wrapping_mul(0x9E37_79B9_7F4A_7C15)).wrapping_mul(0xD134_2543_DE82_EF95);
     (mixed >> 32).is_multiple_of(3)
@@ -129,7 +129,7 @@ impl Pass {
             pushed: 0,
             bin_bytes: 0,
         };
-        // The smallest attachment bounds the others; without any the area and the layers are all there is.
+        // The smallest attachment limits the pass. Without attachments, the area and the layers of `rendering` do.
         let (mut extent, mut layers) = ([MAX_FRAMEBUFFER_SIZE; 2], MAX_FRAMEBUFFER_LAYERS);
         let mut samples = None;
         for target in pass.targets() {
@@ -158,17 +158,18 @@ impl Pass {
         Ok(pass)
     }
 
-    /// The pixels that it may touch: its area, within all of its attachments.
+    /// The pixels that the pass may change: its area, cut at the smallest attachment.
     pub fn area(&self) -> Rect {
         self.area
     }
 
-    /// How many layers are rendered.
+    /// The number of layers that are rendered.
     pub fn layer_count(&self) -> u32 {
         self.layer_count
     }
 
-    /// The views that each draw is for, by their layers; one `None` if draws say their layers.
+    /// The layers of the views that every draw is rendered to; a single `None` if there are no views, so that draws
+    /// name their layers.
     pub fn views(&self) -> impl Iterator<Item = Option<u32>> + use<> {
         let mask = self.view_mask;
         let views = (0..u32::BITS).filter(move |view| mask & (1 << view) != 0);
@@ -176,7 +177,7 @@ impl Pass {
         none.into_iter().chain(views.map(Some))
     }
 
-    /// Tells if a layer is rendered: without views every one is.
+    /// True if a layer is rendered. Without views every layer is.
     fn renders(&self, layer: u32) -> bool {
         self.view_mask == 0 || 1u32.checked_shl(layer).unwrap_or(0) & self.view_mask != 0
     }
@@ -214,12 +215,12 @@ impl Pass {
     /// Renders all draws that wait, and stores the attachments.
     ///
     /// # Errors
-    /// [`Stopped`] if a fragment program ran for too long; the image is then undefined.
+    /// [`Stopped`] if a fragment program ran for too long. The image is then undefined.
     pub fn flush(&mut self, runtime: &Runtime, counters: &mut Counters) -> Result<(), Stopped> {
         self.render(runtime, counters, false)
     }
 
-    /// Renders all draws that wait, and stores and resolves the attachments as they are to be.
+    /// Renders all draws that wait, then stores and resolves the attachments by their operations.
     ///
     /// # Errors
     /// As [`Pass::flush`].
@@ -261,7 +262,7 @@ impl Pass {
             let elapsed = started.elapsed().as_nanos() as u64;
             counters.add(Counter::RasterTime, elapsed);
         }
-        // From now on the attachments' memory holds what the pass has made of them.
+        // The memory of the attachments now holds the cleared and drawn pixels, so that nothing is cleared again.
         for target in self.targets_mut() {
             target.clear = None;
         }
@@ -270,7 +271,7 @@ impl Pass {
         done
     }
 
-    /// Renders all macro-tiles, each by whichever worker is free.
+    /// Renders all macro-tiles. Each is rendered by the next free worker.
     fn render_macro_tiles(
         &self,
         runtime: &Runtime,
@@ -278,7 +279,7 @@ impl Pass {
         last: bool,
     ) -> Result<(), Stopped> {
         let size = runtime.config().macro_tile_size;
-        // The area begins at or after the framebuffer's corner.
+        // The area's corner is not negative.
         let range = |start: i32, length: u32| {
             let start = start as u32;
             start / size..(start + length).div_ceil(size)
@@ -321,7 +322,7 @@ impl Pass {
         done
     }
 
-    /// The waiting draws made ready for tiles.
+    /// The waiting draws, prepared for tiles.
     fn tile_draws<'a>(&'a self, runtime: &Runtime) -> Vec<Ready<'a>> {
         let targets = Targets {
             color: &self.color,
@@ -349,16 +350,16 @@ impl Pass {
     }
 }
 
-/// A draw made ready for tiles.
+/// A draw that is prepared for tiles.
 enum Ready<'a> {
-    /// It changes nothing.
+    /// A draw that changes nothing.
     Nothing,
     Clear(&'a ClearAttachments),
     Gaussians(Box<GaussianTileDraw<'a>>),
     Primitives(Box<TriangleTileDraw<'a>>),
 }
 
-/// Prepares what an attachment's aspect is resolved to.
+/// Prepares the target that an attachment's aspect is resolved to.
 fn bind_resolve(
     attachment: &Attachment,
     (view, mode): &(ImageView, ResolveMode),
@@ -391,7 +392,7 @@ fn bind(
     Ok(target)
 }
 
-/// What a worker keeps from one macro-tile to the next.
+/// The state that a worker keeps from one macro-tile to the next.
 struct Worker {
     buffers: Buffers,
     gaussians: Box<GaussianTile>,
@@ -418,19 +419,19 @@ impl Worker {
     }
 }
 
-/// What the workers of a flush share.
+/// The data that the workers of a flush share.
 struct Flush<'a> {
     pass: &'a Pass,
     runtime: &'a Runtime,
-    /// Whether the pass ends, so that only what is to be stored is kept.
+    /// True if the pass ends, so that only attachments with [`StoreOp::Store`] are stored.
     last: bool,
     draws: Vec<Ready<'a>>,
-    /// Set when a worker was stopped.
+    /// Set when a program was stopped.
     cancel: AtomicBool,
 }
 
 impl Flush<'_> {
-    /// Runs all draws in one macro-tile, then stores its tiles.
+    /// Runs all draws in one macro-tile, then stores the macro-tile's tiles.
     fn render_macro_tile(
         &self,
         worker: &mut Worker,
@@ -481,7 +482,7 @@ impl Flush<'_> {
         Ok(())
     }
 
-    /// Loads or clears what no draw has touched of a tile.
+    /// Loads or clears the planes of a tile that no draw has touched.
     fn load_all(&self, worker: &mut Worker, layer: u32, tile: &Tile) {
         let (pass, buffers) = (self.pass, &mut worker.buffers);
         let colors = buffers.color.iter_mut().zip(&pass.color);
@@ -531,11 +532,11 @@ impl Flush<'_> {
         }
     }
 
-    /// Clears what lies in one tile.
+    /// Clears the rectangles of a clear within one tile.
     fn clear(&self, worker: &mut Worker, clear: &ClearAttachments, layer: u32, tile: &Tile) {
         let pass = self.pass;
         for &(rect, first_layer, layers) in &clear.rects {
-            // A clear in a pass with views is for all of them.
+            // In a pass with views, a clear applies to all of them.
             let in_layers = pass.view_mask != 0
                 || layer
                     .checked_sub(first_layer)

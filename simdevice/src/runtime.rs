@@ -1,4 +1,4 @@
-//! The runtime: workers, the SIMD level and the configuration, chosen once when a device is created.
+//! The runtime: the workers, the SIMD level and the configuration, which are chosen once when a device is created.
 
 use crate::limits::{MAX_MACRO_TILE_SIZE, TILE_SIZE};
 use crate::stats::optimizations::Optimizations;
@@ -14,42 +14,42 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// What can be chosen when a device is created.
+/// The options of a device that is created.
 #[derive(Clone, Debug)]
 pub struct Config {
     /// Worker threads; 0 means one per processor.
     pub threads: usize,
     /// The SIMD level of every kernel.
     pub simd: SimdLevel,
-    /// The side of a macro-tile, the piece of a pass that one worker renders, in pixels: a multiple of 16 from 16
-    /// to 128. It never changes an image.
+    /// The side of a macro-tile in pixels: a multiple of 16 from 16 to 128. A macro-tile is the piece of a pass that
+    /// one worker renders. The side never changes an image.
     pub macro_tile_size: u32,
-    /// A pass is flushed early when its bins exceed this many bytes.
+    /// The size of a pass's bins, in bytes, beyond which the pass is flushed early.
     pub bin_budget_bytes: u64,
-    /// How many bytes of host memory may hold Gaussians in an order that is faster to read (see
-    /// [`Optimization::ClusterCulling`](crate::stats::optimizations::Optimization::ClusterCulling)): 48 for each, and 192 for spherical harmonics
-    /// of degree 3 if there is room for them.
+    /// The most bytes of host memory for copies of Gaussians in an order that is faster to read; see
+    /// [`Optimization::ClusterCulling`](crate::stats::optimizations::Optimization::ClusterCulling). A Gaussian takes 48
+    /// bytes, and 192 more for spherical harmonics of degree 3 if they fit.
     pub cluster_budget_bytes: u64,
-    /// When a pass is flushed.
+    /// The policy that flushes passes.
     pub flush: FlushPolicy,
     /// The longest time that one batch of shader invocations may take.
     pub shader_timeout: Duration,
-    /// The work that is left out where it changes no pixel.
+    /// The optimizations: work that is omitted because it changes no pixel.
     pub optimizations: Optimizations,
-    /// Gathers what draws do in tiles, if anybody wants to know. It never changes an image.
+    /// The recorder of the work of draws and dispatches, if work is to be recorded. It never changes an image.
     pub recorder: Option<Arc<Recorder>>,
-    /// Timestamps count the simulated hardware's nanoseconds instead of the host's.
+    /// True if timestamps count the simulated hardware's nanoseconds instead of the host's.
     pub simulated_timestamps: bool,
 }
 
-/// When a pass's bins are rendered. It never changes an image.
+/// The moments at which a pass's bins are rendered. They never change an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum FlushPolicy {
-    /// When they exceed the budget, at a barrier and at the end of the pass.
+    /// Flushes if the bins exceed the budget, at a barrier and at the end of the pass.
     WhenFull,
-    /// After every draw, too.
+    /// Flushes after every draw, too.
     EveryDraw,
-    /// After some draws, too, which follow from the number and how many draws the pass had.
+    /// Flushes after about one draw in three, too. The seed and the number of draws so far determine after which.
     SomeDraws(u64),
 }
 
@@ -70,7 +70,7 @@ impl Default for Config {
     }
 }
 
-/// Why a device could not be created.
+/// The reasons why a device could not be created.
 #[derive(Debug, thiserror::Error)]
 pub enum DeviceError {
     /// The processor lacks the SIMD level asked for.
@@ -79,12 +79,13 @@ pub enum DeviceError {
     /// A macro-tile of this side cannot be cut into tiles, or is too large.
     #[error("a macro-tile's side must be a multiple of 16 from 16 to 128, not {0}")]
     MacroTileSize(u32),
-    /// The host gave no threads.
+    /// The host refused to start threads.
     #[error("the worker pool cannot be started: {0}")]
     Threads(#[from] ThreadPoolBuildError),
 }
 
-/// What kernels and stages run by. Its threads are joined when it is dropped.
+/// The workers, the SIMD level and the configuration that kernels and stages use. Its threads are joined when it is
+/// dropped.
 #[derive(Debug)]
 pub struct Runtime {
     workers: Workers,
@@ -94,10 +95,10 @@ pub struct Runtime {
 }
 
 impl Runtime {
-    /// Starts workers.
+    /// Starts the workers.
     ///
     /// # Errors
-    /// [`DeviceError`] if the processor lacks the level, the macro-tile's size is impossible or the host refuses
+    /// [`DeviceError`] if the processor lacks the SIMD level, the macro-tile's side is impossible or the host refuses
     /// threads.
     pub fn new(config: &Config) -> Result<Self, DeviceError> {
         let level = config
@@ -116,12 +117,13 @@ impl Runtime {
         })
     }
 
-    /// What was chosen when it was created.
+    /// The configuration that it was created with.
     pub fn config(&self) -> &Config {
         &self.config
     }
 
-    /// The recorder, if anybody wants to know now what is done.
+    /// The recorder, if work is recorded at present: because the configuration has a recorder or simulated timestamps,
+    /// or because a query listens.
     pub(crate) fn recorder(&self) -> Option<&Recorder> {
         let config = &self.config;
         let wanted = config.recorder.is_some()
@@ -155,10 +157,11 @@ impl Runtime {
         }
     }
 
-    /// Shares tasks among workers, each of which takes `piece` of them at a time and does them in order. A worker's state
-    /// is made when it takes its first task. When a task stops, `cancel` is set and no more are taken.
+    /// Shares tasks among workers. A worker takes `piece` tasks at a time and does them in order. Its state is made
+    /// when it takes its first task. When a task stops, `cancel` is set and no more tasks are taken.
     ///
-    /// Returns the states of all workers, and why a task stopped: that others were cancelled then tells nothing.
+    /// Returns the states of all workers, and the error of the task that stopped. Errors of tasks that were cancelled
+    /// for it are ignored.
     pub(crate) fn share<W: Send>(
         &self,
         tasks: Range<u64>,
@@ -198,17 +201,17 @@ impl Runtime {
     }
 }
 
-/// A pool that joins its threads. rayon's own only tells them to stop, which is too late for a driver that may be
-/// unloaded the moment its device is destroyed.
+/// A thread pool that joins its threads when it is dropped. rayon's pool only tells its threads to stop, which is not
+/// enough for a driver that may be unloaded as soon as its device is destroyed.
 #[derive(Debug)]
 struct Workers {
-    /// Present until dropped.
+    /// The pool; `None` only while it is dropped.
     pool: Option<ThreadPool>,
     threads: Vec<JoinHandle<()>>,
 }
 
 impl Workers {
-    /// Starts `count` threads; 0 means one per processor.
+    /// Starts `count` threads; 0 starts one per processor.
     fn new(count: usize) -> Result<Self, ThreadPoolBuildError> {
         let mut workers = Self {
             pool: None,
@@ -237,10 +240,10 @@ impl Workers {
 
 impl Drop for Workers {
     fn drop(&mut self) {
-        // Threads end only when the pool is gone.
+        // The threads end after the pool is dropped.
         self.pool = None;
         for thread in self.threads.drain(..) {
-            // A worker that panicked has told the caller of its work already.
+            // A panic of a worker was already passed on to the caller of its work.
             let _ = thread.join();
         }
     }

@@ -2,13 +2,13 @@
 
 use half::f16;
 
-/// Texels along a block's side.
+/// The number of texels along a block's side.
 pub(super) const SIDE: usize = 4;
 
-/// Texels of a block.
+/// The number of texels of a block.
 const TEXELS: usize = SIDE * SIDE;
 
-/// A block's texels, row by row, in a format without compression.
+/// The texels of a decoded block, row by row, in a format without compression.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Block {
     bytes: [u8; TEXELS * 8],
@@ -32,7 +32,7 @@ impl Block {
         &self.bytes[row * pitch..][..pitch]
     }
 
-    /// The block with the alpha of all its texels, of four bytes each, at its greatest.
+    /// The block with the alpha of all its texels set to 1. Texels must have four bytes each.
     pub(super) fn opaque(mut self) -> Self {
         for texel in self.bytes[..4 * TEXELS].as_chunks_mut::<4>().0 {
             texel[3] = u8::MAX;
@@ -41,43 +41,44 @@ impl Block {
     }
 }
 
-/// A block of texels of four bytes each, by a decoder that takes the bytes from one row to the next.
+/// A block of texels of four bytes each. `decode` gets the compressed bytes, the output, and the bytes from one row to
+/// the next.
 fn rgba(bytes: &[u8; 16], decode: impl Fn(&[u8], &mut [u8], usize)) -> Block {
     let mut rgba = [0u8; 4 * TEXELS];
     decode(bytes, &mut rgba, 4 * SIDE);
     Block::of(&rgba)
 }
 
-/// Two colours and a palette of them, perhaps with transparent black.
+/// Decodes BC1: two colours and a palette between them, perhaps with transparent black.
 pub(super) fn bc1(bytes: &[u8; 16]) -> Block {
     rgba(bytes, bcdec_rs::bc1)
 }
 
-/// As [`bc1`], with four bits of alpha for each texel.
+/// Decodes BC2: the colours of [`bc1`], and four bits of alpha for each texel.
 pub(super) fn bc2(bytes: &[u8; 16]) -> Block {
     rgba(bytes, bcdec_rs::bc2)
 }
 
-/// As [`bc1`], with a palette of alphas.
+/// Decodes BC3: the colours of [`bc1`], and a palette of alphas.
 pub(super) fn bc3(bytes: &[u8; 16]) -> Block {
     rgba(bytes, bcdec_rs::bc3)
 }
 
-/// Red by a palette, as a float.
+/// Decodes BC4: a palette of red, as floats.
 pub(super) fn bc4(bytes: &[u8; 16], signed: bool) -> Block {
     let mut red = [0f32; TEXELS];
     bcdec_rs::bc4_float(bytes, &mut red, SIDE, signed);
     Block::of(&red)
 }
 
-/// Red and green by a palette each, as floats.
+/// Decodes BC5: a palette of red and one of green, as floats.
 pub(super) fn bc5(bytes: &[u8; 16], signed: bool) -> Block {
     let mut both = [0f32; 2 * TEXELS];
     bcdec_rs::bc5_float(bytes, &mut both, 2 * SIDE, signed);
     Block::of(&both)
 }
 
-/// Halves of red, green and blue, with an alpha of 1.
+/// Decodes BC6H: red, green and blue in binary16, with an alpha of 1.
 pub(super) fn bc6h(bytes: &[u8; 16], signed: bool) -> Block {
     let mut rgb = [0u16; 3 * TEXELS];
     bcdec_rs::bc6h_half(bytes, &mut rgb, 3 * SIDE, signed);
@@ -89,7 +90,7 @@ pub(super) fn bc6h(bytes: &[u8; 16], signed: bool) -> Block {
     Block::of(&halves)
 }
 
-/// Red, green, blue and alpha by up to three palettes.
+/// Decodes BC7: red, green, blue and alpha by up to three palettes.
 pub(super) fn bc7(bytes: &[u8; 16]) -> Block {
     rgba(bytes, bcdec_rs::bc7)
 }
@@ -98,7 +99,7 @@ pub(super) fn bc7(bytes: &[u8; 16]) -> Block {
 mod tests {
     use crate::Format;
 
-    /// The registers of each texel of a block.
+    /// The components of each texel of a block.
     fn texels(format: Format, block: &[u8]) -> Vec<[f32; 4]> {
         let mut whole = [0; 16];
         whole[..block.len()].copy_from_slice(block);
@@ -124,7 +125,7 @@ mod tests {
 
     #[test]
     fn colours_lie_between_two_ends() {
-        // Red first and greater, then blue; the codes of the first row are 0, 1, 2, 3.
+        // Red is first and greater, then comes blue. The codes of the first row are 0, 1, 2, 3.
         let block = [0x00, 0xF8, 0x1F, 0x00, 0b11_10_01_00, 0, 0, 0];
         let row = &texels(Format::Bc1RgbUnormBlock, &block)[..4];
         let byte = |code: u8| f32::from(code) / 255.0;
@@ -132,7 +133,7 @@ mod tests {
         assert_eq!(row[1], [0.0, 0.0, 1.0, 1.0]);
         assert_eq!(row[2], [byte(170), 0.0, byte(85), 1.0]);
         assert_eq!(row[3], [byte(85), 0.0, byte(170), 1.0]);
-        // The other way about, code 3 is black, and transparent if there is alpha.
+        // In the other order, code 3 is black, and transparent if there is alpha.
         let block = [0x1F, 0x00, 0x00, 0xF8, 0b11_10_01_00, 0, 0, 0];
         let opaque = &texels(Format::Bc1RgbUnormBlock, &block)[..4];
         let clear = &texels(Format::Bc1RgbaUnormBlock, &block)[..4];
@@ -180,7 +181,7 @@ mod tests {
 
     #[test]
     fn single_components_lie_between_two_ends_exactly() {
-        // Ends 255 and 0; codes 0 to 7, in 3 bits each.
+        // The ends are 255 and 0. Codes 0 to 7 follow, with 3 bits each.
         let codes: u64 = (0..8u64).fold(0, |all, code| all | code << (3 * code));
         let mut block = (codes << 16 | 0x00FF).to_le_bytes();
         let sevenths = texels(Format::Bc4UnormBlock, &block);
@@ -189,7 +190,7 @@ mod tests {
             assert!((texel[0] - expected).abs() < 1e-6, "{texel:?} {expected}");
             assert_eq!(texel[1..], [0.0, 0.0, 1.0]);
         }
-        // As signed ones: -1 and 1, so that there are five steps, then the extremes.
+        // As signed ends, -1 and 1 are in ascending order, so that there are five steps and then the extremes.
         block[..2].copy_from_slice(&[0x81, 0x7F]);
         let fifths = texels(Format::Bc4SnormBlock, &block);
         let expected = [-1.0, 1.0, -0.6, -0.2, 0.2, 0.6, -1.0, 1.0];

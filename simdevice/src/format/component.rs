@@ -3,12 +3,12 @@
 use std::fmt;
 use std::fmt::{Display, Formatter};
 
-/// How the bits of a component are to be read.
+/// The interpretation of a component's bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Numeric {
-    /// 0 to 1.
+    /// A number from 0 to 1.
     Unorm,
-    /// -1 to 1.
+    /// A number from -1 to 1.
     Snorm,
     /// An unsigned integer that is converted to floating point.
     Uscaled,
@@ -22,15 +22,15 @@ pub enum Numeric {
     Sfloat,
     /// A floating-point number without a sign: 5 bits of exponent, 5 or 6 of mantissa.
     Ufloat,
-    /// 0 to 1 by the sRGB transfer function, alpha linear.
+    /// A number from 0 to 1, encoded by the sRGB transfer function. Alpha is linear.
     Srgb,
     /// Three 9-bit mantissas with one 5-bit exponent.
     SharedExponent,
-    /// A depth and a stencil component, which live in planes of their own (see [`Format::plane`]).
+    /// A depth and a stencil component, each in its own plane (see [`Format::plane`](super::Format::plane)).
     DepthStencil,
 }
 
-/// A component's meaning.
+/// The meaning of a component.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Channel {
     /// Red.
@@ -52,7 +52,7 @@ pub enum Channel {
 }
 
 impl Channel {
-    /// The register that holds it, if any.
+    /// The register that holds the component, if it has one.
     pub(crate) fn register(self) -> Option<usize> {
         match self {
             Self::R | Self::D | Self::S => Some(0),
@@ -67,13 +67,13 @@ impl Channel {
 /// A component: its meaning and its width in bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Component {
-    /// What it means.
+    /// The meaning of the component.
     pub channel: Channel,
-    /// How many bits it has.
+    /// The number of bits.
     pub bits: u32,
 }
 
-/// Which half of a depth and stencil image is meant.
+/// The aspect of an image: colour, depth or stencil.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Aspect {
     /// Colour texels.
@@ -84,7 +84,7 @@ pub enum Aspect {
     Stencil,
 }
 
-/// A clear value, as bits: how they are read depends on the format cleared.
+/// A clear value. The image's format must match the variant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ClearValue {
     /// For normalised and floating-point colour formats.
@@ -95,9 +95,9 @@ pub enum ClearValue {
     Uint([u32; 4]),
     /// For depth and stencil formats.
     DepthStencil {
-        /// Depth, 0 to 1.
+        /// The depth, from 0 to 1.
         depth: f32,
-        /// Stencil.
+        /// The stencil value.
         stencil: u32,
     },
 }

@@ -17,7 +17,7 @@ pub(super) fn decode(numeric: Numeric, component: Component, code: u32) -> f32 {
         Numeric::Sint => f32::from_bits(sign_extend(code, bits) as u32),
         Numeric::Sfloat if bits == 16 => f16::from_bits(code as u16).to_f32(),
         Numeric::Sfloat => f32::from_bits(code),
-        // The same exponent as binary16's, above a shorter mantissa.
+        // The exponent is that of binary16; the mantissa is shorter.
         Numeric::Ufloat => f16::from_bits((code << (15 - bits)) as u16).to_f32(),
         Numeric::Srgb if component.channel == Channel::A => from_unorm(code, bits),
         Numeric::Srgb => SRGB.linear[code as u8 as usize],
@@ -25,8 +25,8 @@ pub(super) fn decode(numeric: Numeric, component: Component, code: u32) -> f32 {
     }
 }
 
-/// The bits of a component whose register is `value`: to nearest, ties to even, clamped; NaN becomes 0 where
-/// there is none.
+/// The bits of a component whose register is `value`: rounded to nearest, ties to even, and clamped. NaN becomes 0 in
+/// encodings without NaN.
 pub(super) fn encode(numeric: Numeric, component: Component, value: f32) -> u32 {
     let bits = component.bits;
     let mask = u32::MAX >> (32 - bits);
@@ -76,20 +76,20 @@ fn round_ties_even(value: f64) -> f64 {
     (value + NO_FRACTION) - NO_FRACTION
 }
 
-/// Clamps to 0 to 1; NaN becomes 0.
+/// Clamps to 0 to 1. NaN becomes 0.
 fn clamp_unorm(value: f32) -> f64 {
     f64::from(if value > 0.0 { value.min(1.0) } else { 0.0 })
 }
 
 fn from_unorm(code: u32, bits: u32) -> f32 {
-    // Both are exact in binary32 up to 24 bits, so that the quotient is correctly rounded.
+    // Both operands are exact in binary32 up to 24 bits, so that the quotient is correctly rounded.
     code as f32 / (u32::MAX >> (32 - bits)) as f32
 }
 
 fn to_unorm(value: f32, bits: u32) -> u32 {
     let max = f64::from(u32::MAX >> (32 - bits));
-    // The product of 24 and up to 24 bits is exact in binary64, so that only the sum rounds: to nearest, ties to
-    // even, and to an integer, since 2^52 leaves no bits for a fraction. It stands in the low bits.
+    // The product of 24 and up to 24 bits is exact in binary64, so that only the sum rounds: to nearest, ties to even,
+    // and to an integer, since 2^52 leaves no bits for a fraction. The integer is in the low bits.
     (clamp_unorm(value) * max + 4_503_599_627_370_496.0).to_bits() as u32
 }
 
@@ -101,24 +101,24 @@ pub(super) fn to_unorm8(value: f32) -> u8 {
     to_unorm(value, 8) as u8
 }
 
-/// R, G and B by the transfer function, A linear.
+/// Decodes sRGB: R, G and B by the transfer function, A linearly.
 pub(super) fn from_srgb8([r, g, b, a]: [u8; 4]) -> [f32; 4] {
     let linear = &SRGB.linear;
     let [r, g, b] = [r, g, b].map(|code| linear[usize::from(code)]);
     [r, g, b, from_unorm8(a)]
 }
 
-/// The inverse of [`from_srgb8`].
+/// Encodes sRGB: R, G and B by the transfer function, A linearly.
 pub(super) fn to_srgb8([r, g, b, a]: [f32; 4]) -> [u8; 4] {
     let table = &*SRGB;
     let [r, g, b] = [r, g, b].map(|linear| table.encode(linear));
     [r, g, b, to_unorm8(a)]
 }
 
-/// Components that are converted at once between binary16 and binary32.
+/// The number of components that are converted at once between binary16 and binary32.
 const HALVES: usize = 16;
 
-/// Reads consecutive little-endian binary16 numbers, as many as both slices have.
+/// Reads consecutive little-endian binary16 numbers until either slice ends.
 pub(super) fn from_halves(bytes: &[u8], out: &mut [f32]) {
     for (bytes, out) in bytes.chunks(2 * HALVES).zip(out.chunks_mut(HALVES)) {
         let mut halves = [f16::ZERO; HALVES];
@@ -128,7 +128,7 @@ pub(super) fn from_halves(bytes: &[u8], out: &mut [f32]) {
     }
 }
 
-/// Writes consecutive little-endian binary16 numbers, as many as both slices have room for.
+/// Writes consecutive little-endian binary16 numbers until either slice ends.
 pub(super) fn to_halves(numbers: &[f32], out: &mut [u8]) {
     for (numbers, out) in numbers.chunks(HALVES).zip(out.chunks_mut(2 * HALVES)) {
         let mut halves = [f16::ZERO; HALVES];
@@ -138,8 +138,8 @@ pub(super) fn to_halves(numbers: &[f32], out: &mut [u8]) {
     }
 }
 
-/// A float without a sign: 5 bits of exponent with bias 15, `mantissa` bits. Negative numbers become 0, finite
-/// ones that are too large the greatest finite one.
+/// Encodes a float without a sign: 5 bits of exponent with bias 15, and `mantissa` bits. Negative numbers become 0, and
+/// finite numbers that are too large become the greatest finite one.
 fn to_ufloat(value: f32, mantissa: u32) -> u32 {
     let infinity = 31 << mantissa;
     if value.is_nan() {
@@ -148,7 +148,7 @@ fn to_ufloat(value: f32, mantissa: u32) -> u32 {
     if value == f32::INFINITY {
         return infinity;
     }
-    // A binary32's exponent; for what becomes denormal, that of the least normal number.
+    // The exponent of the number, or that of the least normal number if the result is denormal.
     let exponent = ((value.to_bits() >> 23) as i32 - 127).max(-14);
     if value <= 0.0 {
         return 0;
@@ -159,7 +159,7 @@ fn to_ufloat(value: f32, mantissa: u32) -> u32 {
     code.min(infinity - 1)
 }
 
-/// The exponent's bias and the mantissa's bits of the shared-exponent format.
+/// The exponent's bias in the shared-exponent format; `SHARED_MANTISSA` is the number of the mantissa's bits.
 const SHARED_BIAS: i32 = 15;
 const SHARED_MANTISSA: i32 = 9;
 
@@ -169,7 +169,7 @@ pub(super) fn from_shared_exponent(code: u32) -> [f32; 4] {
     [component(0), component(9), component(18), 1.0]
 }
 
-/// Vulkan 1.3, "RGB to Shared Exponent Conversion".
+/// Encodes a shared-exponent texel (Vulkan 1.3, "RGB to Shared Exponent Conversion").
 pub(super) fn to_shared_exponent(texel: &[f32; 4]) -> u32 {
     const MAX: f32 = 65_408.0;
     let [r, g, b, _] = texel.map(|component| {
@@ -194,19 +194,19 @@ pub(super) fn to_shared_exponent(texel: &[f32; 4]) -> u32 {
         | (exponent as u32) << 27
 }
 
-/// The sRGB transfer function and its inverse at 8 bits, by table.
+/// Tables of the sRGB transfer function and its inverse for 8-bit codes.
 struct Srgb {
     /// The linear value of each code.
     linear: [f32; 256],
     /// The least linear value that rounds to each code.
     threshold: [f32; 256],
-    /// The code of the least linear value with these upper 16 bits.
+    /// The code for the least linear value with these upper 16 bits.
     code: Vec<u8>,
 }
 
 static SRGB: LazyLock<Srgb> = LazyLock::new(Srgb::new);
 
-/// The sRGB transfer function from linear, 0 to 1 (Khronos Data Format 1.3, 13.3.2).
+/// The sRGB transfer function from linear values, from 0 to 1 (Khronos Data Format 1.3, 13.3.2).
 pub(super) fn srgb_from_linear(linear: f64) -> f64 {
     if linear <= 0.003_130_8 {
         12.92 * linear
@@ -215,7 +215,7 @@ pub(super) fn srgb_from_linear(linear: f64) -> f64 {
     }
 }
 
-/// The sRGB transfer function to linear, 0 to 1 (Khronos Data Format 1.3, 13.3.1).
+/// The sRGB transfer function to linear values, from 0 to 1 (Khronos Data Format 1.3, 13.3.1).
 pub(super) fn linear_from_srgb(encoded: f64) -> f64 {
     if encoded <= 0.040_45 {
         encoded / 12.92
@@ -230,7 +230,7 @@ impl Srgb {
             (srgb_from_linear(f64::from(f32::from_bits(bits))) * 255.0).round_ties_even() as u8
         };
         let one = 1f32.to_bits();
-        // Positive floats are ordered as their bits are, and so are their codes.
+        // Positive floats have the same order as their bits, and so have their codes.
         let threshold = std::array::from_fn(|code| {
             let (mut below, mut reached) = (0, one);
             while below < reached {
@@ -252,7 +252,7 @@ impl Srgb {
 
     fn encode(&self, linear: f32) -> u8 {
         let linear = clamp_unorm(linear) as f32;
-        // Among floats of equal upper 16 bits at most two codes occur.
+        // Floats with equal upper 16 bits have at most two codes.
         let code = self.code[(linear.to_bits() >> 16) as usize];
         match self.threshold.get(usize::from(code) + 1) {
             Some(&next) if linear >= next => code + 1,

@@ -1,21 +1,21 @@
-//! The encodings of depth attachments: depths as numbers that compare as the depths do.
+//! The encodings of depth attachments: integers that compare as the depths do.
 
 use crate::format::Format;
 use crate::simd::bits_of;
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, u32x16};
 
-/// How depths become numbers.
+/// The encoding of depths.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DepthEncoding {
     /// A normalised integer of this many bits.
     Unorm(u32),
-    /// binary32.
+    /// The bits of a binary32 number.
     Float,
 }
 
 impl DepthEncoding {
-    /// Of a depth format.
+    /// The encoding of a depth format.
     pub fn of(format: Format) -> Self {
         match format {
             Format::D16Unorm => Self::Unorm(16),
@@ -24,7 +24,7 @@ impl DepthEncoding {
         }
     }
 
-    /// The numbers of depths, clamped to `range`; NaN becomes the least.
+    /// Encodes depths, clamped to `range`. NaN becomes the least depth.
     #[inline(always)]
     pub fn encode<S: Simd>(self, simd: S, depth: f32x16<S>, range: (f32, f32)) -> u32x16<S> {
         let (low, high) = (f32x16::splat(simd, range.0), f32x16::splat(simd, range.1));
@@ -34,7 +34,8 @@ impl DepthEncoding {
             Self::Float => bits_of(depth + 0.0),
             Self::Unorm(bits) => {
                 let scaled = depth * (1u32 << bits) as f32;
-                // (2^n - 1) d = 2^n d - d: the first is exact, so the nearest integer to it is the result or one more.
+                // (2^n - 1) d = 2^n d - d. The first term is exact, so that its nearest integer is the result or one
+                // more.
                 let nearest = scaled.round_ties_even();
                 let excess = (scaled - nearest + 0.5) - depth;
                 let one = excess
@@ -45,7 +46,7 @@ impl DepthEncoding {
         }
     }
 
-    /// The depth that a number means.
+    /// The depth of a code.
     pub fn decode(self, code: u32) -> f32 {
         match self {
             Self::Float => f32::from_bits(code),
@@ -53,7 +54,7 @@ impl DepthEncoding {
         }
     }
 
-    /// As [`DepthEncoding::encode`], of one depth.
+    /// Encodes one depth, clamped to 0 to 1.
     pub fn encode_one(self, depth: f32) -> u32 {
         let depth = if depth > 0.0 { depth.min(1.0) } else { 0.0 };
         match self {

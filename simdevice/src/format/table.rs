@@ -1,4 +1,4 @@
-//! The table of formats, and how rows of texels are decoded and encoded.
+//! The table of formats, and the decoding and encoding of rows of texels.
 
 use super::block::{self, Block};
 use super::convert;
@@ -6,7 +6,7 @@ use crate::format::{Aspect, Channel, ClearValue, Component, Numeric};
 
 macro_rules! formats {
     ($($variant:ident: $numeric:ident, $($channel:ident $bits:literal)+;)*) => {
-        /// How a texel or a vertex attribute is stored.
+        /// The storage format of a texel or a vertex attribute.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         #[allow(missing_docs, reason = "the names are Vulkan's")]
         pub enum Format {
@@ -14,25 +14,25 @@ macro_rules! formats {
         }
 
         impl Format {
-            /// Every format, in Vulkan's order.
+            /// All formats, in Vulkan's order.
             pub const ALL: &[Self] = &[$(Self::$variant,)*];
 
-            /// How its components' bits are read.
+            /// The interpretation of its components' bits.
             pub const fn numeric(self) -> Numeric {
                 match self {
                     $(Self::$variant => Numeric::$numeric,)*
                 }
             }
 
-            /// Bytes per texel, or per block of a compressed format. Formats of both depth and stencil have no texel of
-            /// both: see [`Format::plane`].
+            /// The bytes per texel, or per block of a compressed format. A format with both depth and stencil has no
+            /// texel of both: see [`Format::plane`].
             pub const fn texel_size(self) -> usize {
                 match self {
                     $(Self::$variant => (0 $(+ $bits)+) / 8,)*
                 }
             }
 
-            /// Its components, least significant bits first; a texel is little-endian.
+            /// The components of the format, least significant bits first. A texel is little-endian.
             pub const fn components(self) -> &'static [Component] {
                 match self {
                     $(Self::$variant => &[$(Component { channel: Channel::$channel, bits: $bits },)+],)*
@@ -181,19 +181,19 @@ formats! {
     Bc7SrgbBlock: Srgb, X 32 X 32 X 32 X 32;
 }
 
-/// A texel has at most this many bytes.
+/// The most bytes of a texel.
 pub const MAX_TEXEL_SIZE: usize = 16;
 
-/// What registers hold where a format has no component.
+/// The values of registers whose component a format lacks.
 const ABSENT: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
 
 impl Format {
-    /// Whether registers hold integers.
+    /// True if registers hold integers.
     pub const fn is_integer(self) -> bool {
         matches!(self.numeric(), Numeric::Uint | Numeric::Sint)
     }
 
-    /// Whether a texel has this component.
+    /// True if a texel has this component.
     pub fn has(self, channel: Channel) -> bool {
         self.components().iter().any(|c| c.channel == channel)
     }
@@ -221,7 +221,7 @@ impl Format {
         }
     }
 
-    /// Reads a texel. Bytes that `texel` lacks are zero.
+    /// Decodes a texel. Bytes missing from `texel` are taken as zero.
     pub fn decode(self, texel: &[u8]) -> [f32; 4] {
         let mut out = [ABSENT];
         let size = self.texel_size();
@@ -235,14 +235,14 @@ impl Format {
         out[0]
     }
 
-    /// The bytes of a texel; only the first [`Format::texel_size`] count.
+    /// Encodes a texel. Only the first [`Format::texel_size`] bytes are used.
     pub fn encode(self, texel: [f32; 4]) -> [u8; MAX_TEXEL_SIZE] {
         let mut out = [0; MAX_TEXEL_SIZE];
         self.encode_row(&[texel], &mut out[..self.texel_size()]);
         out
     }
 
-    /// Reads consecutive texels, as many as both slices have.
+    /// Decodes consecutive texels until either slice ends.
     pub fn decode_row(self, bytes: &[u8], out: &mut [[f32; 4]]) {
         match self {
             Self::R8G8B8A8Unorm | Self::A8B8G8R8UnormPack32 => {
@@ -287,7 +287,7 @@ impl Format {
         }
     }
 
-    /// Writes consecutive texels, as many as both slices have room for.
+    /// Encodes consecutive texels until either slice ends.
     pub fn encode_row(self, texels: &[[f32; 4]], out: &mut [u8]) {
         match self {
             Self::R8G8B8A8Unorm | Self::A8B8G8R8UnormPack32 => {
@@ -322,7 +322,7 @@ impl Format {
         }
     }
 
-    /// The bytes that one aspect of an image of this format is cleared to.
+    /// The bytes to which one aspect of an image of this format is cleared.
     pub fn encode_clear(self, aspect: Aspect, value: ClearValue) -> [u8; MAX_TEXEL_SIZE] {
         let Some(plane) = self.plane(aspect) else {
             return [0; MAX_TEXEL_SIZE];
@@ -332,7 +332,7 @@ impl Format {
             ClearValue::Int(value) => value.map(|component| f32::from_bits(component as u32)),
             ClearValue::Uint(value) => value.map(f32::from_bits),
             ClearValue::DepthStencil { stencil, .. } if aspect == Aspect::Stencil => {
-                // The value's low bits are what the stencil buffer receives.
+                // The stencil buffer receives the value's low bits.
                 [f32::from_bits(stencil & 0xFF), 0.0, 0.0, 0.0]
             }
             ClearValue::DepthStencil { depth, .. } => [depth, 0.0, 0.0, 0.0],
@@ -405,7 +405,7 @@ pub(super) fn encode_components(
 }
 
 impl Format {
-    /// Texels along the side of what is stored as a unit: 4, or 1 for formats without compression.
+    /// The number of texels along the side of a storage unit: 4 for compressed formats, otherwise 1.
     pub const fn block_side(self) -> u32 {
         if self.decompressed().is_some() {
             block::SIDE as u32
@@ -414,7 +414,8 @@ impl Format {
         }
     }
 
-    /// The format that holds a compressed format's texels one by one, without loss.
+    /// The uncompressed format that holds a compressed format's texels without loss; `None` if this format is not
+    /// compressed.
     pub const fn decompressed(self) -> Option<Self> {
         Some(match self {
             Self::Bc1RgbUnormBlock
@@ -437,7 +438,7 @@ impl Format {
     /// The texels of a block, in the format of [`Format::decompressed`]; `None` if this format is not compressed.
     pub(crate) fn decode_block(self, bytes: &[u8; 16]) -> Option<Block> {
         Some(match self {
-            // What would be transparent with alpha is opaque without.
+            // Transparent texels are opaque in formats without alpha.
             Self::Bc1RgbUnormBlock | Self::Bc1RgbSrgbBlock => block::bc1(bytes).opaque(),
             Self::Bc1RgbaUnormBlock | Self::Bc1RgbaSrgbBlock => block::bc1(bytes),
             Self::Bc2UnormBlock | Self::Bc2SrgbBlock => block::bc2(bytes),

@@ -7,7 +7,7 @@ fn first<const N: usize>(texel: &[u8; MAX_TEXEL_SIZE]) -> [u8; N] {
     *texel.first_chunk().unwrap()
 }
 
-/// Formats whose every texel is a texel of one component at a time, decoded and encoded alike.
+/// The formats whose components are decoded and encoded independently of each other.
 fn simple() -> impl Iterator<Item = Format> {
     Format::ALL.iter().copied().filter(|format| {
         !matches!(
@@ -35,7 +35,7 @@ fn every_code_survives_a_round_trip() {
         let mut shift = 0;
         for component in format.components() {
             let codes = 1u64 << component.bits;
-            // Every code up to 16 bits; a sample of the wider ones.
+            // Every code of up to 16 bits is tested, and a sample of the wider ones.
             let step = if component.bits <= 16 {
                 1
             } else {
@@ -48,7 +48,7 @@ fn every_code_survives_a_round_trip() {
                 let out = format.encode(registers);
                 let nan = !format.is_integer() && registers.iter().any(|r| r.is_nan());
                 let expected = match (format.numeric(), component.bits) {
-                    // The least code of a signed normalised component means -1 too.
+                    // The least code of a signed normalised component is a second one for -1.
                     (Numeric::Snorm, bits) if code == 1 << (bits - 1) => code + 1,
                     _ if component.channel == Channel::X => 0,
                     _ => code,
@@ -96,14 +96,14 @@ fn packed_formats_have_their_components_in_place() {
 #[test]
 fn unorm_rounds_to_nearest_even_and_clamps() {
     let encode = |x| Format::R8Unorm.encode([x, 0.0, 0.0, 0.0])[0];
-    // 127.5 lies between two codes.
+    // 127.5 is between two codes.
     assert_eq!(encode(0.5), 128);
     assert_eq!(encode(0.5f32.next_down()), 127);
     assert_eq!(encode(-1.0), 0);
     assert_eq!(encode(7.0), 255);
     assert_eq!(encode(f32::NAN), 0);
     assert_eq!(encode(f32::INFINITY), 255);
-    // 2.5 / 255 is not a float; its neighbours are on either side.
+    // 2.5 / 255 is not a float, but is between two neighbouring ones.
     let tie = (2.5f64 / 255.0) as f32;
     assert_eq!(encode(tie.next_down()), 2);
     assert_eq!(encode(tie.next_up()), 3);

@@ -1,20 +1,20 @@
-//! Numbers from 0 to 1 in bytes, 16 words at a time.
+//! Conversions between bytes and numbers from 0 to 1, 16 words at a time.
 
 use crate::simd::bits_of;
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, f32x16, i32x8, i32x16, mask32x16, u32x8, u32x16};
 
-/// 1/255 as the sum of a number of 16 bits, whose product with a code is exact, and the rest: the sum of the two
+/// 1/255 as the sum of a number of 16 bits, whose product with a code is exact, and the rest. The sum of the two
 /// products rounds as the quotient does.
 const INV_255: [f32; 2] = {
     let high = f32::from_bits((1f32 / 255.0).to_bits() & !0xFF);
     [high, (1.0 / 255.0 - high as f64) as f32]
 };
 
-/// Defines how one byte of each word is a fraction of 255, as its quotient rounds.
+/// Defines a function that divides one byte of each word by 255, correctly rounded.
 macro_rules! unorm8_fraction {
     ($name:ident, $words:ident, $integers:ident, $floats:ident) => {
-        /// One byte of each word as a fraction of 255, as its quotient rounds.
+        /// One byte of each word divided by 255, correctly rounded.
         #[inline(always)]
         pub fn $name<S: Simd>(word: $words<S>, shift: u32) -> $floats<S> {
             let code = if shift == 24 {
@@ -32,17 +32,17 @@ unorm8_fraction!(unorm8_fraction, u32x16, i32x16, f32x16);
 
 unorm8_fraction!(unorm8_fraction_8, u32x8, i32x8, f32x8);
 
-/// Colours of 16 fragments, by component.
+/// The colours of 16 fragments, by component.
 pub type Colors<S> = [f32x16<S>; 4];
 
-/// Clamps; NaN becomes the least.
+/// Clamps numbers. NaN becomes `low`.
 #[inline(always)]
 pub(crate) fn clamp<S: Simd>(simd: S, value: f32x16<S>, low: f32, high: f32) -> f32x16<S> {
     let (low, high) = (f32x16::splat(simd, low), f32x16::splat(simd, high));
     value.max_precise(low).min(high)
 }
 
-/// Whether a level's multiplication and addition round once.
+/// True if a multiplication and addition of this level round only once.
 #[inline(always)]
 fn is_fused<S: Simd>(simd: S) -> bool {
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
@@ -55,18 +55,18 @@ fn is_fused<S: Simd>(simd: S) -> bool {
     fused
 }
 
-/// 8-bit codes of 0 to 1, to nearest, in the low bits; above them are bits of no meaning. Numbers that are too great by
-/// some units in the last place do as well.
+/// The nearest 8-bit codes of numbers from 0 to 1, in the low bits. The bits above are undefined. Numbers may be too
+/// great by some units in the last place.
 #[inline(always)]
 fn unorm8<S: Simd>(simd: S, value: f32x16<S>) -> u32x16<S> {
-    // Leaves no bits for a fraction.
+    // At this magnitude binary32 has no bits for a fraction.
     const NO_FRACTION: f32 = 8_388_608.0;
     if is_fused(simd) {
-        // Rounded once, to the nearest integer; 127.5 is the only tie.
+        // This rounds once, to the nearest integer. 127.5 is the only tie.
         let scaled = value.mul_add(f32x16::splat(simd, 255.0), f32x16::splat(simd, NO_FRACTION));
         return bits_of(scaled);
     }
-    // 255 v = 256 v - v: the first is exact, so the nearest integer to it is the result or one more.
+    // 255 v = 256 v - v. The first term is exact, so that its nearest integer is the result or one more.
     let scaled = value * 256.0;
     let rounded = scaled + NO_FRACTION;
     let excess = (scaled - (rounded - NO_FRACTION) + 0.5) - value;
@@ -75,7 +75,7 @@ fn unorm8<S: Simd>(simd: S, value: f32x16<S>) -> u32x16<S> {
     bits_of(rounded - one)
 }
 
-/// Four bytes of 0 to 1 in a word, each to nearest.
+/// Packs numbers, clamped to 0 to 1, as four bytes per word, each rounded to nearest.
 #[inline(always)]
 pub fn pack_unorm8<S: Simd>(simd: S, colors: &Colors<S>, bgra: bool) -> u32x16<S> {
     let mut clamped = *colors;
@@ -85,7 +85,7 @@ pub fn pack_unorm8<S: Simd>(simd: S, colors: &Colors<S>, bgra: bool) -> u32x16<S
     pack_unorm8_in_range(simd, &clamped, bgra)
 }
 
-/// As [`pack_unorm8`], of what needs no clamping.
+/// Packs numbers as [`pack_unorm8`] does, without clamping.
 #[inline(always)]
 pub fn pack_unorm8_in_range<S: Simd>(simd: S, [r, g, b, a]: &Colors<S>, bgra: bool) -> u32x16<S> {
     let (first, third) = if bgra { (b, r) } else { (r, b) };
@@ -95,7 +95,7 @@ pub fn pack_unorm8_in_range<S: Simd>(simd: S, [r, g, b, a]: &Colors<S>, bgra: bo
         | unorm8(simd, *a) << 24
 }
 
-/// Four bytes of each word as numbers from 0 to 1.
+/// The four bytes of each word as numbers from 0 to 1.
 #[inline(always)]
 pub fn unpack_unorm8<S: Simd>(_: S, texels: u32x16<S>, bgra: bool) -> Colors<S> {
     let first = unorm8_fraction(texels, 0);

@@ -10,7 +10,8 @@ use devmem::Allocation;
 use std::ops::RangeInclusive;
 use std::sync::{Arc, Weak};
 
-/// Vertex attributes by lane, as they are read.
+/// The attributes of a group's Gaussians as they are read from the streams: an array per component, an element per
+/// lane.
 #[derive(Clone, Debug)]
 pub(super) struct Attributes {
     pub(super) position: [[f32; F32_LANES]; 3],
@@ -31,13 +32,13 @@ impl Default for Attributes {
 }
 
 impl Attributes {
-    /// The second largest scale of a lane.
+    /// The second largest of a lane's three scales.
     pub(super) fn second_scale(&self, lane: usize) -> f32 {
         let [a, b, c] = self.scale.each_ref().map(|scale| scale[lane]);
         a.max(b).min(a.max(c)).min(b.max(c))
     }
 
-    /// Makes a lane what a lane of others is.
+    /// Overwrites lane `to` with lane `from` of `others`.
     pub(super) fn copy_lane(&mut self, to: usize, others: &Self, from: usize) {
         let copy = |own: &mut [f32; F32_LANES], other: &[f32; F32_LANES]| own[to] = other[from];
         for (own, other) in self.position.iter_mut().zip(&others.position) {
@@ -53,12 +54,13 @@ impl Attributes {
     }
 }
 
-/// A contiguous span is read whole where vertices lie at most this far apart, and piecewise beyond.
+/// The largest stride in bytes for which consecutive vertices are read with one copy, gaps included. With a larger
+/// stride each element is read by itself.
 const WHOLE_SPAN_STRIDE: u32 = 64;
 
 /// The vertices of one group of one instance.
 pub(super) struct Group<'a> {
-    /// The vertices, as many as the group has.
+    /// The vertices, as many as the group has lanes in use.
     vertices: Vertices<'a>,
     pub(super) instance: u32,
     pub(super) first_instance: u32,
@@ -66,16 +68,16 @@ pub(super) struct Group<'a> {
 }
 
 enum Vertices<'a> {
-    /// Consecutive from this one on.
+    /// Consecutive vertices, from this one on.
     From(u64),
-    /// Picked by an index buffer.
+    /// Vertex numbers read from an index buffer.
     Listed(Vec<u64>),
-    /// The first one of a draw and, from there, each of a cluster.
+    /// The draw's first vertex, and the numbers of a cluster's vertices relative to it.
     Cluster(u64, &'a [u32]),
 }
 
 impl<'a> Group<'a> {
-    /// Vertices `start..start + len` of `append`'s count, for `instance`.
+    /// The `len` vertices of `append` from number `start` on, for `instance`.
     pub(super) fn new(append: &GaussianAppend, instance: u32, start: u32, len: usize) -> Self {
         let first = u64::from(append.first) + u64::from(start);
         let vertices = match &append.indices {
@@ -90,7 +92,7 @@ impl<'a> Group<'a> {
         }
     }
 
-    /// The vertices of `append`'s count whose numbers are `numbers`, for `instance`.
+    /// The vertices of `append` with these numbers, relative to its first vertex, for `instance`.
     pub(super) fn of_cluster(append: &GaussianAppend, instance: u32, numbers: &'a [u32]) -> Self {
         Self {
             vertices: Vertices::Cluster(append.first.into(), numbers),
@@ -116,25 +118,25 @@ impl<'a> Group<'a> {
         }
     }
 
-    /// Whether lanes read elements that follow one another.
+    /// True if consecutive lanes read consecutive elements of `stream`.
     fn is_consecutive(&self, stream: &AttributeStream) -> bool {
         stream.instance_divisor.is_none() && matches!(self.vertices, Vertices::From(_))
     }
 }
 
-/// Reads `len` vertices' numbers from index number `first` on.
+/// Reads `len` vertex numbers from the index buffer, from its element `first` on, and adds the vertex offset.
 fn read_indices(stream: &IndexStream, first: u64, len: usize) -> Vec<u64> {
     let mut indices = Vec::new();
     stream.read(first, len as u32, &mut indices);
     let vertex = |index: u32| {
         let vertex = i64::from(index) + i64::from(stream.vertex_offset);
-        // A negative sum names no vertex; the largest one lies outside every buffer, which reads zero.
+        // A negative sum names no vertex. The largest number lies outside every buffer, which reads as zero.
         u64::try_from(vertex).unwrap_or(u64::from(u32::MAX))
     };
     indices.into_iter().map(vertex).collect()
 }
 
-/// Bytes of the attribute format, and whether it is 32-bit floats.
+/// The bytes of an attribute of this format, and true if its components are 32-bit floats.
 fn layout(format: Format) -> (usize, bool) {
     let floats = matches!(
         format,
@@ -146,7 +148,7 @@ fn layout(format: Format) -> (usize, bool) {
     (format.texel_size(), floats)
 }
 
-/// Reads attribute elements; holds the scratch that this needs.
+/// Reads attributes. It owns the bytes that a read needs in between.
 #[derive(Default)]
 pub(super) struct Fetcher {
     bytes: Vec<u8>,
@@ -188,7 +190,8 @@ impl Fetcher {
         }
     }
 
-    /// Reads what a group's Gaussians are in their own space, but for their colours.
+    /// Reads a group's positions, scales, rotations and opacities, without the model's transform, and applies the
+    /// activations.
     pub(super) fn read_own(
         &mut self,
         streams: &GaussianAttributes,
@@ -204,7 +207,7 @@ impl Fetcher {
         }
     }
 
-    /// Multiplies a group's opacities by the model's, if it has some.
+    /// Multiplies a group's opacities by the model's opacities, if the model has any.
     pub(super) fn fade(
         &mut self,
         streams: &GaussianAttributes,
@@ -228,7 +231,7 @@ impl Fetcher {
         bytes
     }
 
-    /// Fills the scratch with one element every returned number of bytes.
+    /// Copies the group's elements into `bytes` and returns the distance in bytes from one to the next.
     fn read_bytes(&mut self, stream: &AttributeStream, group: &Group<'_>, size: usize) -> usize {
         let stride = stream.stride as usize;
         if group.is_consecutive(stream)
@@ -252,7 +255,7 @@ impl Fetcher {
         size
     }
 
-    /// Makes room for `bytes`.
+    /// Makes `bytes` at least so long.
     fn grow(&mut self, bytes: usize) {
         if self.bytes.len() < bytes {
             self.bytes.resize(bytes, 0);
@@ -260,7 +263,8 @@ impl Fetcher {
     }
 }
 
-/// Makes standard deviations and opacities of what is stored, in the first `len` lanes.
+/// Applies the activations to the first `len` lanes: `exp` to logarithms of scales, the logistic function to logits of
+/// opacities.
 #[cold]
 fn activate(activations: Activations, len: usize, out: &mut Attributes) {
     let apply = |lanes: &mut [f32; F32_LANES], function: fn(f64) -> f64| {
@@ -277,7 +281,7 @@ fn activate(activations: Activations, len: usize, out: &mut Attributes) {
     }
 }
 
-/// Where in `stream`'s buffer the element that lane `lane` reads is.
+/// The byte offset in `stream`'s buffer of the element that lane `lane` reads.
 fn at(stream: &AttributeStream, group: &Group<'_>, lane: usize) -> u64 {
     group
         .element(stream, lane)
@@ -288,12 +292,12 @@ fn at(stream: &AttributeStream, group: &Group<'_>, lane: usize) -> u64 {
 /// Reads the spherical harmonics of single lanes.
 pub(super) struct CoefficientReader<'a> {
     streams: &'a [AttributeStream],
-    /// The coefficients of a vertex follow one another as 32-bit floats.
+    /// True if the coefficients of a vertex follow one another in memory as 32-bit floats.
     packed: bool,
 }
 
 impl<'a> CoefficientReader<'a> {
-    /// A reader of these streams, one per coefficient.
+    /// A reader of these streams, one stream per coefficient.
     pub(super) fn new(streams: &'a [AttributeStream]) -> Self {
         let follows = |a: &AttributeStream, b: &AttributeStream| {
             Arc::ptr_eq(&a.buffer.memory, &b.buffer.memory)
@@ -311,12 +315,12 @@ impl<'a> CoefficientReader<'a> {
         Self { streams, packed }
     }
 
-    /// How many numbers a vertex's coefficients are.
+    /// The number of floats in a vertex's coefficients: three for each coefficient.
     pub(super) fn floats(&self) -> usize {
         3 * self.streams.len().min(MAX_COEFFICIENTS)
     }
 
-    /// Has the first `count` coefficients of `lane` on their way while other things are computed, if they are packed.
+    /// Starts to load the first `count` coefficients of `lane` into the processor's cache, if they are packed.
     #[inline(always)]
     pub(super) fn prefetch(&self, group: &Group<'_>, lane: usize, count: usize) {
         if let Some(stream) = self.streams.first().filter(|_| self.packed) {
@@ -326,7 +330,7 @@ impl<'a> CoefficientReader<'a> {
         }
     }
 
-    /// Reads the coefficients of `lane`: red, green, blue of each in turn.
+    /// Reads the coefficients of `lane`: red, green and blue of each in turn.
     pub(super) fn read(&self, group: &Group<'_>, lane: usize, out: &mut [f32; COEFFICIENT_FLOATS]) {
         let at = |stream| at(stream, group, lane);
         let count = self.streams.len().min(MAX_COEFFICIENTS);
@@ -357,27 +361,27 @@ impl<'a> CoefficientReader<'a> {
     }
 }
 
-/// Spherical harmonics that were read already: those of all lanes, one after the other, or none.
+/// Spherical harmonics in host memory: those of all lanes, one lane after the other, or none.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Harmonics<'a> {
     floats: &'a [f32],
-    /// How many floats a lane has, of which a draw of a lower degree takes the first.
+    /// The number of floats per lane. A draw of a lower degree uses the first of them.
     stride: usize,
 }
 
 impl<'a> Harmonics<'a> {
-    /// Those of lanes of `stride` floats each.
+    /// The harmonics of lanes of `stride` floats each.
     pub(super) fn new(floats: &'a [f32], stride: usize) -> Self {
         Self { floats, stride }
     }
 
-    /// The floats of a lane, and what follows them; none if there are none.
+    /// The floats from the given lane's first on, or an empty slice if there are none.
     #[inline(always)]
     pub(super) fn from(&self, lane: usize) -> &'a [f32] {
         self.floats.get(lane * self.stride..).unwrap_or_default()
     }
 
-    /// The floats of lanes that follow one another, if they are there, and no lane has more than `most`.
+    /// The floats of a range of lanes, if they are held and a lane has at most `most`.
     #[inline(always)]
     pub(super) fn of_all(&self, lanes: RangeInclusive<usize>, most: usize) -> Option<&'a [f32]> {
         let (first, end) = (*lanes.start(), *lanes.end() + 1);
@@ -388,12 +392,12 @@ impl<'a> Harmonics<'a> {
     }
 }
 
-/// What an attribute is read from.
+/// Identifies the bytes that an attribute is read from: the memory, its generation, the place in it, and the format.
 #[derive(Debug)]
 pub(super) struct SourceFingerprint {
     memory: Weak<Allocation>,
     generation: u64,
-    /// Offset and size of the buffer, stride and offset of the attribute.
+    /// Offset and size of the buffer in the memory, then stride and offset of the attribute.
     place: [u64; 4],
     format: Format,
     instance_divisor: Option<u32>,
@@ -416,12 +420,12 @@ impl SourceFingerprint {
         }
     }
 
-    /// The memory, while it is there.
+    /// The memory, if it is still allocated.
     pub(super) fn memory(&self) -> Option<Arc<Allocation>> {
         self.memory.upgrade()
     }
 
-    /// Whether the memory still holds what it held.
+    /// True if the memory is still allocated and nothing was written to it since.
     pub(super) fn is_current(&self) -> bool {
         let memory = self.memory.upgrade();
         memory.is_some_and(|memory| memory.generation() == self.generation)
@@ -432,13 +436,13 @@ impl SourceFingerprint {
         self.is_same_buffer(other) && how(self) == how(other)
     }
 
-    /// Whether both are read from the same place, whatever is there.
+    /// True if both name the same place in the same memory, of whatever generation and format.
     pub(super) fn is_same_buffer(&self, other: &Self) -> bool {
         self.memory.ptr_eq(&other.memory) && self.place == other.place
     }
 }
 
-/// Whether an attribute is in memory that only the device writes.
+/// True if an attribute is in memory that only the device writes.
 pub(super) fn is_device_local(stream: &AttributeStream) -> bool {
     !stream.buffer.memory.is_host_visible()
 }

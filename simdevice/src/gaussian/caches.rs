@@ -1,4 +1,4 @@
-//! What a device keeps of Gaussians that may be drawn again.
+//! The caches in which a device keeps data derived from Gaussians that may be drawn again.
 
 use super::cluster_cache::ClusterCache;
 use super::reuse::ReuseCache;
@@ -8,6 +8,6 @@ use super::reuse::ReuseCache;
 pub struct Caches {
     /// The clusters of Gaussians that were drawn more than once.
     pub(super) clusters: ClusterCache,
-    /// What was last made of sets.
+    /// The sorted sets of recent draws.
     pub(super) last_sets: ReuseCache,
 }

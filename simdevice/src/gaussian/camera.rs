@@ -1,5 +1,5 @@
-//! Cameras: what is the same for all Gaussians of a view, where a point appears, and how it moves in the picture as it moves
-//! in space.
+//! Cameras: the constants that all Gaussians of a view share, the projection of a point to the picture, and the
+//! projection's Jacobian.
 
 use super::depth::CenterDepth;
 use super::footprint::Visible;
@@ -12,18 +12,17 @@ use crate::state::gaussian::{
 };
 use crate::stats::optimizations::Optimizations;
 
-/// `log2_opacity` less this is how far the exponent may fall where the alpha floor is zero: beyond, alpha
-/// underflows binary32.
+/// The least base-2 logarithm of alpha that is drawn where the alpha floor is zero: binary32 underflows below it.
 const LEAST_LOG2_ALPHA: f64 = -150.0;
 
-/// `q / 2` in units of natural exponents is this times `u^2 + v^2`: `ln 2`.
+/// The factor from a base-2 exponent to a natural one: `q / 2 = LN_2 (u^2 + v^2)`.
 pub(super) const LN_2: f64 = std::f64::consts::LN_2;
 
-/// What is the same for all Gaussians of a draw.
+/// The constants that all Gaussians of a draw share.
 #[derive(Clone, Debug)]
 pub(crate) struct ViewConstants {
     pub(super) model: CameraModel,
-    /// Whether covariances are those of projected points.
+    /// True if covariances come from the unscented transform.
     pub(super) unscented: bool,
     pub(super) order: GaussianOrder,
     pub(super) geometry: GaussianGeometry,
@@ -33,7 +32,7 @@ pub(crate) struct ViewConstants {
     pub(super) focal: [f64; 2],
     /// The principal point in framebuffer pixels.
     pub(super) center: [f64; 2],
-    /// After how many pixels the picture repeats to the right and to the left, if it does.
+    /// The number of pixels after which the picture repeats horizontally, if it does.
     pub(super) period: Option<f64>,
     /// Bounds of `t.x / t.z` and `t.y / t.z` in the Jacobian.
     pub(super) slope_min: [f64; 2],
@@ -47,7 +46,7 @@ pub(crate) struct ViewConstants {
     pub(super) sh_degree: u32,
     pub(super) visible: Visible,
     pub(super) optimizations: Optimizations,
-    /// How centres become depths, if the draw needs to know.
+    /// The map from depth variables to depths, if the draw needs depths.
     pub(super) depth: Option<CenterDepth>,
 }
 
@@ -102,19 +101,20 @@ impl ViewConstants {
         }
     }
 
-    /// The bounds of slopes in a pinhole's Jacobian: the least ones and the greatest.
+    /// The least and the greatest slopes in x and y at which a pinhole's Jacobian is taken.
     pub(super) fn slopes(&self) -> [[f64; 2]; 2] {
         [self.slope_min, self.slope_max]
     }
 
-    /// Bounds of the visible pixels' centres along an axis, with a pixel to spare.
+    /// Bounds of the visible pixels' centres along an axis, widened by a pixel on each side.
     pub(super) fn visible_range(&self, axis: usize) -> [f64; 2] {
         let [first, last] = self.visible.pixels(axis);
         [first - 1.0, last + 2.0]
     }
 }
 
-/// After how many pixels a camera's picture repeats to the right and to the left, if it does.
+/// The number of pixels after which a camera's picture repeats horizontally: that of a full turn for a panorama, `None`
+/// for other cameras.
 pub(super) fn period(camera: &Camera) -> Option<f64> {
     #[cfg(feature = "mistakes")]
     if Mistake::PanoramaEnds.is_made() {
@@ -124,9 +124,9 @@ pub(super) fn period(camera: &Camera) -> Option<f64> {
     (camera.model == CameraModel::Equirectangular).then_some(std::f64::consts::TAU * focal)
 }
 
-/// A point's place in the picture relative to the principal point, and the two rows of the place's Jacobian, both
-/// for focal lengths of 1. `t` is in camera axes. A pinhole's Jacobian is taken at a slope that is clamped to the least and the
-/// greatest of `slopes`. What has no place is not a number.
+/// A point's position in the picture relative to the principal point, and the two rows of the projection's Jacobian,
+/// both for focal lengths of 1. `t` is in camera axes. A pinhole's Jacobian is taken at a slope that is clamped to the
+/// least and the greatest of `slopes`. Points that have no position give NaN.
 pub(super) fn linearize(
     model: CameraModel,
     slopes: [[f64; 2]; 2],
@@ -146,11 +146,11 @@ fn pinhole([least, greatest]: [[f64; 2]; 2], [x, y, z]: [f64; 3]) -> ([f64; 2], 
     (place, [[1.0 / z, 0.0, -u / z], [0.0, 1.0 / z, -v / z]])
 }
 
-/// Equidistant: the distance from the principal point is the angle from the axis.
+/// The equidistant projection: the distance from the principal point is the angle from the axis.
 fn fisheye([x, y, z]: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
     let r = x.hypot(y);
     if r == 0.0 {
-        // Straight behind, the picture of a point is a circle.
+        // A point straight behind the camera projects to a whole circle, so it has no position.
         let scale = if z > 0.0 { 1.0 / z } else { f64::NAN };
         return ([0.0; 2], [[scale, 0.0, 0.0], [0.0, scale, 0.0]]);
     }
@@ -168,15 +168,15 @@ fn fisheye([x, y, z]: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
     )
 }
 
-/// How near to a pole, as the cosine of the latitude, a panorama's Jacobian is taken at most: beyond, meridians run so
-/// close together that it would be infinite at the pole.
+/// The least cosine of the latitude for which a panorama's Jacobian is taken. At a pole itself it would be infinite,
+/// because the meridians meet.
 const POLE: f64 = 1.0 / 1024.0;
 
-/// Longitude, from straight ahead to the right, and latitude, downwards.
+/// The equirectangular projection: longitude, from straight ahead to the right, and latitude, downwards.
 fn equirectangular([x, y, z]: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
     let r = x.hypot(z);
     let length = r.hypot(y);
-    // At a pole every longitude is as good; that of straight ahead is taken.
+    // At a pole the longitude is undefined; that of straight ahead is taken.
     let (sin, cos) = if r > 0.0 { (x / r, z / r) } else { (0.0, 1.0) };
     let across = 1.0 / r.max(POLE * length);
     let (rise, run) = (y / length, r / length);
@@ -189,7 +189,8 @@ fn equirectangular([x, y, z]: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
     )
 }
 
-/// The depth variable: what near and far plane, fragment depth and the view-depth order go by.
+/// The depth variable, by which near and far plane, fragment depth and the view-depth order go: `t.z` for pinhole and
+/// orthographic cameras, the distance from the eye for the others.
 pub(super) fn depth(model: CameraModel, [x, y, z]: [f64; 3]) -> f64 {
     match model {
         CameraModel::Pinhole | CameraModel::Orthographic => z,
@@ -202,7 +203,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Wider than any slope here.
+    /// Bounds beyond every slope in these tests.
     const SLOPES: [[f64; 2]; 2] = [[-1e3; 2], [1e3; 2]];
 
     const MODELS: [CameraModel; 4] = [
@@ -212,7 +213,7 @@ mod tests {
         CameraModel::Equirectangular,
     ];
 
-    /// Central differences.
+    /// The Jacobian by central differences.
     fn jacobian(model: CameraModel, t: [f64; 3]) -> [[f64; 3]; 2] {
         let step = 1e-5 * (t[0].abs() + t[1].abs() + t[2].abs());
         let mut rows = [[0.0; 3]; 2];
@@ -234,7 +235,8 @@ mod tests {
         #[test]
         fn the_jacobian_is_the_derivative(x in -3.0..3.0f64, y in -3.0..3.0f64, z in 0.5..9.0f64, behind: bool) {
             for model in MODELS {
-                // Fisheyes and panoramas see what is beside and behind them; a fisheye not what is straight behind.
+                // Fisheyes and panoramas see to the sides and behind. A fisheye has no position for what is straight
+                // behind.
                 let t = match model {
                     CameraModel::Fisheye | CameraModel::Equirectangular if behind => [x + x.signum(), y, -z],
                     _ => [x, y, z],
@@ -271,7 +273,7 @@ mod tests {
         assert_eq!(place([0.0, 0.0, -1.0]), [2.0 * right, 0.0]);
         assert_eq!(place([0.0, 5.0, 0.0]), [0.0, right]);
         assert_eq!(place([0.0, -5.0, 0.0]), [0.0, -right]);
-        // At a pole, and a little beside it, a point moves no faster than the stated limit.
+        // At a pole, and a little away from it, a point moves no faster than the stated limit.
         for x in [0.0, 1e-9] {
             let (_, rows) = linearize(CameraModel::Equirectangular, SLOPES, [0.0, 2.0, x]);
             assert_eq!(rows[0], [512.0, 0.0, 0.0]);

@@ -1,7 +1,7 @@
-//! Which draws have clusters. Those of a draw are made when it is drawn for the second time, since a picture that is drawn
-//! once is drawn faster without them; those of a large one from then on, a piece each time, and it has none before all are
-//! there. They live in the memory that they are derived from: when that is freed or written,
-//! they are gone.
+//! The cache of clusters. A draw's clusters are built when it is drawn for the second time, because a picture that is
+//! drawn only once is faster without them. Those of a large draw are built over several draws, a piece each time, and
+//! are used once all pieces exist. They belong to the memory that they are derived from, and are dropped when it is
+//! freed or written.
 
 use super::attributes::{SourceFingerprint, is_device_local};
 use super::clusters;
@@ -14,41 +14,41 @@ use crate::stats::optimizations::Optimization;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::Instant;
 
-/// Draws of fewer Gaussians have no clusters.
+/// The least number of Gaussians in a draw with clusters.
 const LEAST_COUNT: u32 = 512;
 
-/// Draws that are remembered.
+/// The most draws that are remembered.
 const MAX_ENTRIES: usize = 256;
 
-/// A draw that was seen.
+/// A draw that was recorded, and its clusters.
 #[derive(Debug)]
 struct Entry {
-    /// Those of positions, scales, rotations, opacities and, if they are in the clusters, spherical harmonics.
+    /// The fingerprints of positions, scales, rotations, opacities and, if the clusters hold them, spherical harmonics.
     streams: Vec<SourceFingerprint>,
-    /// What is applied to them.
+    /// The activations that are applied to the attributes.
     activations: Activations,
     first: u32,
     count: u32,
-    /// Whether they are 2D Gaussians, whose third scale means nothing.
+    /// True for 2D Gaussians, whose third scale is ignored.
     is_flat: bool,
-    /// When it was last drawn.
+    /// The value of [`Entries::now`] when it was last drawn.
     used: u64,
-    /// Its clusters, if they were made; they belong to the memory of its positions.
+    /// The clusters of the draw, if they were built. The memory of the positions owns them.
     clusters: Weak<Clusters>,
-    /// Those that are being made; they belong there, too.
+    /// The unfinished clusters, if some pieces are built. The same memory owns them.
     building: Weak<Mutex<ClusterBuilder>>,
-    /// Bytes that they take.
+    /// The bytes that its clusters take when they are finished.
     bytes: u64,
 }
 
 #[derive(Debug, Default)]
 struct Entries {
     entries: Vec<Entry>,
-    /// Counts the draws.
+    /// The number of draws so far.
     now: u64,
 }
 
-/// The draws of a device that were seen, and their clusters.
+/// The recent draws of a device, and their clusters.
 #[derive(Debug, Default)]
 pub(crate) struct ClusterCache(Mutex<Entries>);
 
@@ -81,7 +81,7 @@ impl Entry {
         what(self) == what(other) && streams.all(|(a, b)| a.is_same(b))
     }
 
-    /// Whether its clusters hold all that those of `other` would: the same Gaussians, and at least the same of their spherical
+    /// True if its clusters hold all that those of `other` would: the same Gaussians, and at least the same spherical
     /// harmonics.
     fn covers(&self, other: &Self) -> bool {
         let mut streams = self.streams.iter().zip(&other.streams);
@@ -94,7 +94,7 @@ impl Entry {
             && streams.all(|(a, b)| a.is_same(b))
     }
 
-    /// Bytes that its clusters take.
+    /// The bytes that its clusters take: zero if none were begun.
     fn memory_bytes(&self) -> u64 {
         match self.clusters.strong_count() + self.building.strong_count() {
             0 => 0,
@@ -121,8 +121,8 @@ impl Entry {
 }
 
 impl Entries {
-    /// Makes room for `bytes` more by freeing the clusters that were not used for longest, and those whose memory has
-    /// changed.
+    /// Frees the least recently used clusters until `bytes` more fit into the budget and at most [`MAX_ENTRIES`] draws
+    /// are remembered.
     fn make_room(&mut self, bytes: u64, budget: u64) {
         self.entries.sort_by_key(|entry| entry.used);
         let held: u64 = self.entries.iter().map(Entry::memory_bytes).sum();
@@ -142,12 +142,13 @@ impl Entries {
 
 impl ClusterCache {
     fn lock(&self) -> MutexGuard<'_, Entries> {
-        // What a panic left behind is only forgotten sooner.
+        // A panic while the lock was held can only leave entries that are dropped too early.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The clusters of what `append` draws, as 2D Gaussians if `is_flat`, if it has any; `advance` makes a piece of them. Draws
-    /// of the same Gaussians by lower degrees share them. All clusters together take at most `budget` bytes.
+    /// The clusters of `append`'s Gaussians, as 2D Gaussians if `is_flat`, or `None` if they have none or these are
+    /// unfinished; `advance` builds the next piece of them. Draws of the same Gaussians with a lower degree of
+    /// spherical harmonics share them. All clusters together take at most `budget` bytes.
     pub(super) fn get(
         &self,
         append: &GaussianAppend,
@@ -160,7 +161,7 @@ impl ClusterCache {
         }
         let with_harmonics = append.attributes.spherical_harmonics.iter().all(is_fixed)
             && clusters::memory_bytes(append, true) <= budget;
-        // Generations are read before the memory, so that what is written meanwhile makes them old.
+        // Generations are read before the memory, so that a write in the meantime makes the clusters out of date.
         let mut drawn = Entry::new(append, is_flat, with_harmonics);
         let memory = &append.attributes.position.buffer.memory;
         let building = {
@@ -193,7 +194,7 @@ impl ClusterCache {
                 building
             });
             drawn.building = Arc::downgrade(&building);
-            // What is made now is for the draws of those, too.
+            // The new clusters also serve the draws that they cover.
             entries.entries.retain(|entry| {
                 let is_covered = drawn.covers(entry);
                 if is_covered && !entry.building.ptr_eq(&drawn.building) {
@@ -217,7 +218,7 @@ impl ClusterCache {
         let mut entries = self.lock();
         let made_by = Arc::downgrade(&building);
         let mut entries = entries.entries.iter_mut();
-        // If there was no room for them meanwhile, this is the only draw that they serve.
+        // If the entry was dropped in the meantime to free memory, the clusters serve this draw only.
         if let Some(entry) = entries.find(|entry| entry.building.ptr_eq(&made_by)) {
             entry.clusters = Arc::downgrade(&clusters);
             entry.building = Weak::new();
@@ -228,7 +229,7 @@ impl ClusterCache {
     }
 }
 
-/// The clusters of each append that has some.
+/// The clusters of each append, where it has some.
 pub(super) fn find(
     set: &GaussianSet,
     cache: &ClusterCache,
@@ -266,16 +267,16 @@ fn shapes(append: &GaussianAppend) -> [&AttributeStream; 4] {
     ]
 }
 
-/// Whether it is, and read by vertex.
+/// True if a stream lies in memory that only the device writes and is read per vertex.
 fn is_fixed(stream: &AttributeStream) -> bool {
     is_device_local(stream) && stream.instance_divisor.is_none()
 }
 
-/// Whether what is drawn can have clusters.
+/// True if an append's Gaussians can have clusters.
 fn is_eligible(append: &GaussianAppend) -> bool {
     let fixed = shapes(append).into_iter().all(is_fixed);
     let model = &append.attributes.model;
-    // What differs from vertex to vertex would have to be in the clusters.
+    // Model attributes per vertex would have to be in the clusters.
     let mut of_model = model.matrix.iter().flat_map(|rows| rows.iter());
     let by_instance = of_model.all(is_by_instance) && model.opacity.iter().all(is_by_instance);
     append.indices.is_none() && append.count >= LEAST_COUNT && fixed && by_instance

@@ -1,8 +1,9 @@
-//! Clusters: the Gaussians of a buffer that is drawn again and again, in an order in which neighbours in space are
-//! neighbours in memory. Bounds tell of a whole cluster that no picture needs it; what is left is read in one go.
+//! Clusters: the Gaussians of a buffer that is drawn repeatedly, reordered so that neighbours in space are neighbours
+//! in memory. The bounds of a cluster can show that no Gaussian of it is in the picture. The other clusters are read
+//! sequentially.
 //!
-//! They are derived from memory that only the device can write, and never change an image. Those of a large draw are made a
-//! piece with each picture, so that no picture waits for all of them.
+//! They are derived from memory that only the device can write, and never change an image. The clusters of a large draw
+//! are built over several pictures, a piece each, so that none waits for all of them.
 
 use super::attributes::{
     Attributes, CoefficientReader, Fetcher, Group, Harmonics, SourceFingerprint,
@@ -15,26 +16,27 @@ use crate::packet::GaussianAppend;
 use devmem::host;
 use rayon::prelude::*;
 
-/// Some Gaussians that are near one another.
+/// A group of Gaussians that are near one another.
 #[derive(Debug)]
 pub(super) struct Cluster {
-    /// The vertices' numbers in the draw.
+    /// The vertices' numbers, relative to the draw's first vertex.
     pub(super) numbers: Vec<u32>,
     pub(super) attributes: Attributes,
-    /// Spherical harmonics, if there was room for them: as many floats for each as [`CoefficientReader::floats`] says.
+    /// Spherical harmonics, if the budget allows them: for each Gaussian as many floats as
+    /// [`CoefficientReader::floats`] says.
     harmonics: Vec<f32>,
     pub(super) bounds: Bounds,
-    /// No Gaussian of it is skipped for what its attributes are.
+    /// True if the attributes of all its Gaussians are valid, so that none is skipped because of them.
     pub(super) is_sound: bool,
 }
 
-/// All Gaussians of a draw without indices.
+/// The clusters of all Gaussians of a draw without indices.
 #[derive(Debug)]
 pub(super) struct Clusters {
-    /// Where the spherical harmonics in them are from, in their order.
+    /// The sources of the spherical harmonics that the clusters hold, in the order of coefficients.
     harmonics: Vec<SourceFingerprint>,
     pub(super) clusters: Vec<Cluster>,
-    /// Those among them that hide others best: large and opaque.
+    /// Copies of the large and opaque Gaussians, which hide others best.
     pub(super) occluders: Vec<Cluster>,
     /// The greatest opacity.
     pub(super) opacity: f32,
@@ -43,15 +45,15 @@ pub(super) struct Clusters {
 /// The least opacity of an occluder.
 const OCCLUDER_OPACITY: f32 = 0.5;
 
-/// The most occluders of a draw of so many Gaussians: looking for large ones among them must not cost what it saves.
+/// The most occluders of a draw of `count` Gaussians. More would cost more time than they save.
 fn max_occluders(count: usize) -> usize {
     (count / 16).min(8 * 1024)
 }
 
-/// Bits of an axis in a Morton code.
+/// The bits of each axis in a Morton code.
 const AXIS_BITS: u32 = 10;
 
-/// Bytes of host memory that clusters of what `append` draws take, with and without spherical harmonics.
+/// The bytes of host memory that clusters of `append`'s Gaussians take, with or without spherical harmonics.
 pub(super) fn memory_bytes(append: &GaussianAppend, with_harmonics: bool) -> u64 {
     let reader = CoefficientReader::new(&append.attributes.spherical_harmonics);
     let floats = if with_harmonics { reader.floats() } else { 0 };
@@ -62,35 +64,35 @@ pub(super) fn memory_bytes(append: &GaussianAppend, with_harmonics: bool) -> u64
     clusters(append.count.into()) * cluster as u64 + occluders * occluder as u64
 }
 
-/// Draws of so many Gaussians have their clusters made at once. Those of more would make a picture wait for long.
+/// The most Gaussians of a draw whose clusters are built in one piece. More would delay a picture noticeably.
 const AT_ONCE: usize = 64 * 1024;
 
-/// The Gaussians of a piece of more, of which there are at most eight.
+/// The number of Gaussians in a piece of a larger draw. There are at most eight pieces.
 fn piece_size(count: usize) -> usize {
     count.div_ceil(8).next_multiple_of(GROUP).max(2 * AT_ONCE)
 }
 
-/// What clusters are made of, the same from the first piece to the last.
+/// The input of a cluster builder, the same for every piece.
 #[derive(Clone, Copy)]
 pub(super) struct ClusterSource<'a> {
-    /// It has no indices, and of a model, which is left out, none by vertex.
+    /// An append without indices. Its model's transform is not applied, and has no attribute per vertex.
     pub(super) append: &'a GaussianAppend,
-    /// Whether they are 2D Gaussians: their third scales are zero.
+    /// True for 2D Gaussians: their third scales are taken as zero.
     pub(super) is_flat: bool,
     pub(super) with_harmonics: bool,
 }
 
-/// Clusters that are made a piece at a time.
+/// Builds clusters a piece at a time.
 #[derive(Debug, Default)]
 pub(super) struct ClusterBuilder {
-    /// The order in which Gaussians lie in clusters, once it is known.
+    /// The order of Gaussians in the clusters, once it is computed.
     order: Option<Vec<u32>>,
     clusters: Vec<Cluster>,
 }
 
 impl ClusterBuilder {
-    /// Makes the next piece: the order, or some clusters; both, where there are no more Gaussians than [`AT_ONCE`].
-    /// Returns how many clusters it made.
+    /// Builds the next piece: the order first, then some clusters each time; both at once if there are at most
+    /// [`AT_ONCE`] Gaussians. Returns the number of clusters that it built.
     pub(super) fn advance(&mut self, source: ClusterSource<'_>) -> usize {
         let count = source.append.count as usize;
         let order = match &self.order {
@@ -118,7 +120,7 @@ impl ClusterBuilder {
         self.clusters.len() - done
     }
 
-    /// All clusters, once they are made.
+    /// All clusters, once the last of them is built.
     pub(super) fn finish(&mut self, source: ClusterSource<'_>) -> Option<Clusters> {
         let count = source.append.count as usize;
         if self.clusters.len() < count.div_ceil(GROUP) {
@@ -148,7 +150,7 @@ impl ClusterBuilder {
 }
 
 impl Clusters {
-    /// Whether the spherical harmonics of what `append` draws are in them, perhaps with those of higher degrees.
+    /// True if the clusters hold the spherical harmonics of `append`, perhaps with those of higher degrees.
     pub(super) fn have_harmonics_of(&self, append: &GaussianAppend) -> bool {
         let drawn = &append.attributes.spherical_harmonics;
         let mut both = drawn.iter().zip(&self.harmonics);
@@ -157,8 +159,8 @@ impl Clusters {
     }
 }
 
-/// The numbers of at most so many Gaussians that may hide others: of the opaque ones those whose second largest scale is
-/// greatest, in the order of clusters.
+/// The numbers of at most `most` Gaussians that may hide others, in the order of clusters: of those that are opaque
+/// enough, the ones with the greatest second largest scale.
 fn occluders(clusters: &[Cluster], most: usize) -> Vec<u32> {
     let opaque = || {
         clusters.iter().flat_map(|cluster| {
@@ -241,13 +243,13 @@ impl Cluster {
 }
 
 impl Cluster {
-    /// Spherical harmonics of all lanes, if it holds them.
+    /// The spherical harmonics of all lanes; empty if the cluster does not hold them.
     pub(super) fn harmonics(&self) -> Harmonics<'_> {
         let stride = self.harmonics.len() / self.numbers.len().max(1);
         Harmonics::new(&self.harmonics, stride)
     }
 
-    /// A cluster of one lane of another, without harmonics.
+    /// A cluster of one lane of another, with the other's bounds and without harmonics.
     pub(super) fn of_one(from: &Self, lane: usize) -> Self {
         let mut cluster = Self {
             numbers: host::with_capacity(GROUP),
@@ -260,7 +262,7 @@ impl Cluster {
         cluster
     }
 
-    /// Adds a lane of another cluster; `bounds` stays as it is.
+    /// Adds a lane of another cluster. `bounds` stays as it is.
     pub(super) fn push(&mut self, from: &Self, lane: usize) {
         self.attributes
             .copy_lane(self.numbers.len(), &from.attributes, lane);
@@ -269,7 +271,7 @@ impl Cluster {
     }
 }
 
-/// The numbers of the draw's vertices in an order in which neighbours are mostly near one another.
+/// The numbers of the draw's vertices in Morton order, in which neighbours are mostly near one another in space.
 fn morton_order(append: &GaussianAppend) -> Vec<u32> {
     let mut positions: Vec<[f32; 3]> = host::zeroed(append.count as usize);
     positions
@@ -291,7 +293,7 @@ fn morton_order(append: &GaussianAppend) -> Vec<u32> {
     let cells = 1.0 / per_cell;
     let code = |&[x, y, z]: &[f32; 3]| {
         let cell = |position: f32, axis: usize| {
-            // What is not a number becomes zero.
+            // NaN becomes zero.
             let cell = (f64::from(position) - low[axis]) * cells;
             spread(cell.clamp(0.0, f64::from((1u32 << AXIS_BITS) - 1)) as u32) << axis
         };
@@ -302,7 +304,8 @@ fn morton_order(append: &GaussianAppend) -> Vec<u32> {
     host::collect(order.into_iter().map(|(_, number)| number))
 }
 
-/// The corner and the cells' side of a grid that holds most positions, whatever lies far off.
+/// The lowest corner and the side of a cell of a grid that holds most positions. A few positions far away do not
+/// enlarge it much.
 fn grid(positions: &[[f32; 3]]) -> ([f64; 3], f64) {
     let finite = || {
         let all = positions.iter();
@@ -328,7 +331,7 @@ fn grid(positions: &[[f32; 3]]) -> ([f64; 3], f64) {
     )
 }
 
-/// Puts two zeros between the bits of a number of [`AXIS_BITS`].
+/// Puts two zeros after each of the [`AXIS_BITS`] bits of a number.
 fn spread(value: u32) -> u32 {
     let value = (value | value << 16) & 0x030_000FF;
     let value = (value | value << 8) & 0x0300_F00F;
@@ -346,7 +349,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use std::sync::Arc;
 
-    /// A draw of so many Gaussians at random places.
+    /// A draw of `count` Gaussians with random attributes.
     fn append(count: usize) -> GaussianAppend {
         const FLOATS: usize = 14;
         let mut rng = ChaCha8Rng::seed_from_u64(1);
@@ -383,7 +386,7 @@ mod tests {
         }
     }
 
-    /// What each piece made, and all clusters.
+    /// The number of clusters that each piece made, and all clusters.
     fn pieces(append: &GaussianAppend) -> (Vec<usize>, Clusters) {
         let source = ClusterSource {
             append,

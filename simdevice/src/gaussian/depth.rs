@@ -1,34 +1,34 @@
-//! The depth of a Gaussian's centre, as the depth attachment holds it.
+//! The depth of a Gaussian's centre, encoded as in the depth attachment.
 
 use crate::format::Format;
 use crate::format::depth::DepthEncoding;
 use crate::state::Viewport;
 use crate::state::gaussian::{Camera, CameraModel};
 
-/// How depths follow one another where depth variables ascend.
+/// The change of depths as depth variables ascend.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum DepthTrend {
-    /// No later one is less.
+    /// Depths never decrease.
     Rising,
-    /// No later one is greater.
+    /// Depths never increase.
     Falling,
-    /// Anyhow.
+    /// Depths follow no order.
     None,
 }
 
-/// How the depth variable of a draw's centres becomes a depth.
+/// The map from the depth variable of a Gaussian's centre to its depth in the attachment's encoding.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct CenterDepth {
-    /// Whether the depth is linear in the depth variable, not in its inverse.
+    /// True if the depth is linear in the depth variable, false if it is linear in its inverse.
     is_linear: bool,
     coefficients: [f64; 2],
-    /// The viewport's depths of 0 and 1.
+    /// The viewport's `minDepth` and `maxDepth`.
     range: [f64; 2],
     code: DepthEncoding,
 }
 
 impl CenterDepth {
-    /// Of a camera and a viewport, for an attachment of `format`.
+    /// The map of a camera and a viewport, for an attachment of `format`.
     pub(crate) fn new(camera: &Camera, viewport: &Viewport, format: Format) -> Self {
         Self {
             #[cfg(feature = "mistakes")]
@@ -42,8 +42,8 @@ impl CenterDepth {
         }
     }
 
-    /// The depth of a centre whose depth variable is `z`: computed in binary64, clamped to 0 to 1, mapped to the
-    /// viewport's range and rounded once, to the format's nearest.
+    /// The encoded depth of a centre whose depth variable is `z`: computed in binary64, clamped to 0 to 1, mapped to
+    /// the viewport's range and rounded once, to the nearest value of the format.
     #[inline]
     pub(crate) fn code(&self, z: f32) -> u32 {
         let z = f64::from(z);
@@ -51,7 +51,8 @@ impl CenterDepth {
         self.encode(c0 + if self.is_linear { c1 * z } else { c1 / z })
     }
 
-    /// The depth of a centre whose normalised device coordinate is `depth`, clamped, mapped and rounded so.
+    /// The encoded depth of a centre whose normalised device coordinate is `depth`: clamped, mapped and rounded as in
+    /// [`CenterDepth::code`].
     #[inline]
     pub(crate) fn encode(&self, depth: f64) -> u32 {
         let [near, far] = self.range;
@@ -69,13 +70,13 @@ impl CenterDepth {
         }
     }
 
-    /// How the numbers mean depths.
+    /// The encoding of depths.
     pub(crate) fn unit(&self) -> DepthEncoding {
         self.code
     }
 
-    /// How [`CenterDepth::code`] changes as z grows; every operation in it is monotonic, its rounding included. Only
-    /// a linear depth may have z of either sign.
+    /// The change of [`CenterDepth::code`] as z grows. Each operation in it is monotonic, its rounding included. Only a
+    /// linear depth allows z of either sign.
     pub(crate) fn trend(&self) -> DepthTrend {
         let [near, far] = self.range;
         let slope = self.coefficients[1] * (far - near);
@@ -88,7 +89,7 @@ impl CenterDepth {
     }
 }
 
-/// Clamps to 0 to 1; what is no number becomes 0, and so does negative zero.
+/// Clamps to 0 to 1. NaN becomes 0, and so does negative zero.
 fn clamp(depth: f64) -> f64 {
     if depth > 0.0 { depth.min(1.0) } else { 0.0 }
 }

@@ -1,26 +1,27 @@
-//! The depth order of a set: a stable sort by key, and equal keys in the order of the draw.
+//! The depth order of a set: a stable sort by depth key. Equal keys keep the order of the draw.
 
 use super::lanes::GROUP;
 use super::sort;
 use super::splat::{ProjectedGroup, locate};
 use devmem::host;
 
-/// A key, and a name that [`locate`] understands.
+/// A depth key, and the index of a splat that [`locate`] takes apart.
 type Pair = (u32, u32);
 
-/// The survivors in depth order: key, and group number times `GROUP` plus place in the group.
+/// The projected Gaussians in depth order: key, and group number times `GROUP` plus lane.
 pub(super) fn sorted(groups: &[ProjectedGroup], workers: usize) -> Vec<Pair> {
     let keys = keys_of(groups);
     let settle = |pairs: &mut [Pair]| settle_ties(&keys, pairs);
     sort::sort_lists(&keys, GROUP as u32, workers, settle)
 }
 
-/// The keys of each group, close together.
+/// The keys of each group.
 fn keys_of(groups: &[ProjectedGroup]) -> Vec<&[[u32; 2]]> {
     host::collect(groups.iter().map(|group| &group.keys[..]))
 }
 
-/// Has equal keys of a sorted sequence follow in the order of the set. Groups are not in that, once there are clusters.
+/// Orders runs of equal keys by their sequence numbers in the set. With clusters, the groups themselves are not in that
+/// order.
 fn settle_ties(keys: &[&[[u32; 2]]], pairs: &mut [Pair]) {
     let sequence = |&(_, name): &Pair| {
         let (group, place) = locate(name);
@@ -30,7 +31,7 @@ fn settle_ties(keys: &[&[[u32; 2]]], pairs: &mut [Pair]) {
         }
         keys[group][place][1]
     };
-    // What decides lies anywhere, so that each would be waited for.
+    // Sequence numbers are scattered in memory, so they are prefetched first.
     let mut tied = Vec::new();
     for (at, two) in pairs.windows(2).enumerate() {
         if two[0].0 == two[1].0 {

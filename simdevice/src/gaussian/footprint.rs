@@ -1,11 +1,11 @@
-//! Which tiles a projected Gaussian reaches: exact tests of its alpha-floor ellipse against rectangles of
-//! pixel centres.
+//! Footprints: the tiles that a projected Gaussian reaches, by exact tests of its alpha-floor ellipse against
+//! rectangles of pixel centres.
 
 use crate::limits::TILE_SIZE;
 use crate::state::Rect;
 use devmem::host;
 
-/// A run of tiles in one row of tiles.
+/// A run of consecutive tiles in one row of tiles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct TileSpan {
     /// The first tile.
@@ -15,27 +15,28 @@ pub(crate) struct TileSpan {
 }
 
 impl TileSpan {
-    /// How many tiles it has.
+    /// The number of tiles.
     #[inline(always)]
     pub(crate) fn len(self) -> usize {
         usize::from(self.end.saturating_sub(self.first))
     }
 }
 
-/// Rows of tiles that a [`TileFootprint`] holds itself.
+/// The most rows of tiles whose spans a [`TileFootprint`] stores inline.
 pub(crate) const HELD_ROWS: usize = 3;
 
-/// The tiles that a Gaussian reaches: a span for each of some rows of tiles that follow one another. Small, since most
-/// reach few tiles, and all of them are read in the order of their depth.
+/// The tiles that a Gaussian reaches: a span for each of some consecutive rows of tiles. It is small, since most
+/// Gaussians reach few tiles, and all of them are read in depth order.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct TileFootprint {
-    /// The first row (low half) and how many rows.
+    /// The first row (low 16 bits) and the number of rows (high 16 bits).
     rows: u32,
-    /// The rows' spans (first and end), if they fit; otherwise they lie among those of the group, at the first one's index.
+    /// The packed spans of the rows, if they fit. Otherwise the first word is the index of the first row's span in the
+    /// group's list of spans.
     held: [u32; HELD_ROWS],
 }
 
-/// A span as a number: its first tile and, from bit 16 on, its end.
+/// A span as a number: its first tile in the low 16 bits, its end in the high 16 bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct PackedSpan(u32);
 
@@ -57,7 +58,7 @@ impl From<PackedSpan> for TileSpan {
 }
 
 impl PackedSpan {
-    /// The span of such a number.
+    /// The span that these bits encode.
     #[inline(always)]
     pub(super) fn from_bits(bits: u32) -> Self {
         Self(bits)
@@ -65,7 +66,8 @@ impl PackedSpan {
 }
 
 impl TileFootprint {
-    /// Empty spans of `rows` rows of tiles from `row` on; `others` makes room for what does not fit.
+    /// A footprint of `rows` rows of tiles from `row` on, with empty spans. If they do not fit inline, `others` is
+    /// extended by them.
     #[inline(always)]
     pub(crate) fn new(row: u16, rows: u16, others: &mut Vec<TileSpan>) -> Self {
         let mut reach = Self {
@@ -80,8 +82,7 @@ impl TileFootprint {
         reach
     }
 
-    /// What it is made of: the first row and, from bit 16 on, how many rows; then the first column and one past the last
-    /// of each row, 16 bits each.
+    /// The footprint as two 64-bit words, for storage.
     #[inline(always)]
     pub(super) fn words(&self) -> [u64; 2] {
         let both = |low: u32, high: u32| u64::from(low) | u64::from(high) << 32;
@@ -89,7 +90,7 @@ impl TileFootprint {
         [both(self.rows, first), both(second, third)]
     }
 
-    /// The one that is made of these.
+    /// The footprint that [`TileFootprint::words`] made these words of.
     #[inline(always)]
     pub(super) fn from_words([first, second]: [u64; 2]) -> Self {
         Self {
@@ -104,13 +105,13 @@ impl TileFootprint {
         self.rows & 0xFFFF
     }
 
-    /// How many rows it has.
+    /// The number of rows.
     #[inline(always)]
     fn len(&self) -> usize {
         (self.rows >> 16) as usize
     }
 
-    /// Sets the span of row `number` of its rows.
+    /// Sets the span of its row `number`, counted from its first row.
     #[inline(always)]
     pub(crate) fn set(&mut self, others: &mut [TileSpan], number: u16, span: TileSpan) {
         let at = usize::from(number);
@@ -121,7 +122,7 @@ impl TileFootprint {
         }
     }
 
-    /// Its rows, each with its span, which may be empty.
+    /// The rows of the footprint, each with its span, which may be empty.
     #[inline(always)]
     pub(crate) fn spans<'a>(
         &'a self,
@@ -130,7 +131,7 @@ impl TileFootprint {
         (self.row()..).zip((0..self.len()).map(|number| self.span(others, number)))
     }
 
-    /// The span of row `number` of its rows.
+    /// The span of its row `number`, counted from its first row.
     #[inline(always)]
     fn span(&self, others: &[TileSpan], number: usize) -> TileSpan {
         if self.len() > HELD_ROWS {
@@ -140,7 +141,7 @@ impl TileFootprint {
         }
     }
 
-    /// Whether it has a tile.
+    /// True if the footprint has this tile.
     #[inline(always)]
     pub(crate) fn covers(&self, others: &[TileSpan], column: u32, row: u32) -> bool {
         let number = row.wrapping_sub(self.row()) as usize;
@@ -151,15 +152,15 @@ impl TileFootprint {
         (u32::from(span.first)..u32::from(span.end)).contains(&column)
     }
 
-    /// The first of the rows that it holds itself and their spans; so that there are always as many, rows without tiles, which
-    /// may lie anywhere, follow. `None` if its spans lie elsewhere.
+    /// The first row and the inline spans, always [`HELD_ROWS`] of them: those beyond the footprint's rows are empty.
+    /// `None` if the spans are in the group's list.
     #[inline(always)]
     pub(crate) fn held(&self) -> Option<(u32, [PackedSpan; HELD_ROWS])> {
         (self.len() <= HELD_ROWS).then(|| (self.row(), self.held.map(PackedSpan)))
     }
 }
 
-/// The pixels that a draw may touch: half-open, in framebuffer coordinates.
+/// The pixels that a draw may touch: a half-open rectangle in framebuffer coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Visible {
     pub left: i64,
@@ -188,38 +189,38 @@ impl From<Rect> for Visible {
     }
 }
 
-/// The ellipse `d^T S^-1 d <= extent` about `mean`, with `S = [a, b; b, c]` in px^2, in the form that its
-/// spans are found from.
+/// The ellipse `d^T S^-1 d <= extent` about `mean`, with `S = [a, b; b, c]` in px^2, in the form from which its spans
+/// are computed.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ellipse {
-    /// Its centre in pixels.
+    /// The centre in pixels.
     pub mean: [f64; 2],
-    /// Half its extent in x and y: `sqrt(a extent)` and `sqrt(c extent)`.
+    /// The half extents in x and y: `sqrt(a extent)` and `sqrt(c extent)`.
     pub half: [f64; 2],
-    /// At height `d.y` its middle is at `d.x = slope d.y`: `b / c`.
+    /// The horizontal middle at height `d.y` is at `d.x = slope d.y`: `b / c`.
     pub slope: f64,
-    /// There its half width is `sqrt(narrowing (half.y^2 - d.y^2))`: `det / c^2`.
+    /// The half width at height `d.y` is `sqrt(narrowing (half.y^2 - d.y^2))`: `det / c^2`.
     pub narrowing: f64,
-    /// It reaches furthest to the right at this height: `b sqrt(extent / a)`.
+    /// The height at which it reaches furthest to the right: `b sqrt(extent / a)`.
     pub peak: f64,
 }
 
-/// The first and last whole number `p` of `first..=last` with `low <= p + 0.5 <= high`.
+/// The first and the last integer `p` of `first..=last` with `low <= p + 0.5 <= high`.
 ///
-/// Whole numbers stay binary64 here: to convert them would cost more than all else.
+/// Integers stay in binary64 here, because conversions would cost more than the rest.
 #[inline(always)]
 fn centres(low: f64, high: f64, first: f64, last: f64) -> Option<[f64; 2]> {
-    // Cut off a pixel beyond the others, they are small, and rounded without calls.
+    // Clamped to a pixel beyond the limits, the values are small enough for `floor` below.
     let low = smaller(larger(low - 0.5, first), last + 1.0);
     let high = larger(smaller(high - 0.5, last), first - 1.0);
     let [low, high] = [-floor(-low), floor(high)];
     (low <= high).then_some([low, high])
 }
 
-/// The greatest whole number that is not greater than `value`, whose magnitude is below 2^51.
+/// The greatest integer that is not greater than `value`, whose magnitude is below 2^51.
 #[inline(always)]
 fn floor(value: f64) -> f64 {
-    // What is added leaves no place for a fraction.
+    // At this magnitude binary64 has no bits for a fraction, so the addition rounds.
     const WHOLE: f64 = (3u64 << 51) as f64;
     let nearest = (value + WHOLE) - WHOLE;
     if nearest > value {
@@ -229,35 +230,35 @@ fn floor(value: f64) -> f64 {
     }
 }
 
-/// The larger one; `b` if either is not a number.
+/// The larger of the two; `b` if either is NaN.
 #[inline(always)]
 fn larger(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 
-/// The smaller one; `b` if either is not a number.
+/// The smaller of the two; `b` if either is NaN.
 #[inline(always)]
 fn smaller(a: f64, b: f64) -> f64 {
     if a < b { a } else { b }
 }
 
-/// The tile of a pixel whose whole coordinate is less than 2^20: added to 1.5 * 2^52, a number is rounded and stands in
-/// the low bits.
+/// The tile that contains pixel number `pixel`, an integer below 2^20. Adding 1.5 * 2^52 rounds a number to an integer
+/// in the low bits.
 #[inline(always)]
 fn tile_of(pixel: f64) -> u16 {
     const PER_PIXEL: f64 = 1.0 / TILE_SIZE as f64;
-    // The middle of its tile rounds to the tile's number.
+    // The tile's centre maps to the tile's number, and all its pixels round to it.
     let middle = pixel * PER_PIXEL - 0.5 * (1.0 - PER_PIXEL);
     (middle + (3u64 << 51) as f64).to_bits() as u16
 }
 
 impl Ellipse {
-    /// The tiles that hold a visible pixel centre's column and row inside the ellipse, if there are any. Spans that do
-    /// not fit go to `others`.
+    /// The tiles whose visible pixel centres the ellipse may contain, or `None` if there are none. Spans that do not
+    /// fit inline go to `others`.
     ///
-    /// The ellipse is convex, so that in each row of tiles the reached ones follow one another, and the
-    /// columns that it spans within the row's pixel centres tell them exactly. The tiles of its box that it does not
-    /// reach are added to `beside`; without it, the whole box is listed.
+    /// The ellipse is convex, so that in each row of tiles the reached ones are consecutive, and the columns that it
+    /// spans between the row's first and last pixel centres give them exactly. The number of tiles in its bounding box
+    /// that it does not reach is added to `beside`; without `beside`, the whole box is taken.
     #[inline(always)]
     pub(crate) fn reach(
         &self,
@@ -273,7 +274,7 @@ impl Ellipse {
         let (Some([left, right]), Some([top, bottom])) = (columns, rows) else {
             return None;
         };
-        // Visible pixels are few enough for 16 bits of tiles.
+        // Limits on the framebuffer's size make tile numbers fit into 16 bits.
         let span = |[left, right]: [f64; 2]| TileSpan {
             first: tile_of(left),
             end: tile_of(right) + 1,
@@ -309,10 +310,10 @@ impl Ellipse {
         (reached > 0).then_some(reach)
     }
 
-    /// How far it reaches to the left and to the right between two heights, all relative to its centre.
+    /// The leftmost and rightmost extent between two heights, all relative to the centre.
     #[inline(always)]
     fn sides(&self, above: f64, below: f64) -> [f64; 2] {
-        // Both sides are monotonic above and below their furthest points, at -peak and peak.
+        // Each side is monotonic above and below its furthest point, at height -peak and peak.
         let left = smaller(larger(-self.peak, above), below);
         let right = smaller(larger(self.peak, above), below);
         let square = self.half[1] * self.half[1];
@@ -337,7 +338,7 @@ mod tests {
         bottom: 150,
     };
 
-    /// `S = [a, b; b, c]` and the extent.
+    /// A Gaussian with covariance `S = [a, b; b, c]`, cut off at `extent`.
     #[derive(Clone, Copy, Debug)]
     struct Gaussian {
         mean: [f64; 2],
@@ -377,9 +378,9 @@ mod tests {
             }
         }
 
-        /// Row, first tile and one past the last tile of each row.
+        /// The row, the first tile, and one past the last tile of each row that has tiles.
         fn spans(&self) -> Vec<(u32, u16, u16)> {
-            // Not the first of its group.
+            // The group's list already has spans of other Gaussians.
             let mut others = vec![TileSpan::default(); 70_000];
             let reach = self.ellipse().reach(&VISIBLE, &mut others, Some(&mut 0));
             let spans = reach.iter().flat_map(|reach| reach.spans(&others));
@@ -389,7 +390,7 @@ mod tests {
                 .collect()
         }
 
-        /// The tiles that hold a visible pixel centre inside the ellipse.
+        /// The tiles that hold a visible pixel centre inside the ellipse, by testing every pixel.
         fn reached(&self) -> BTreeSet<(u16, u16)> {
             let mut tiles = BTreeSet::new();
             for py in VISIBLE.top..VISIBLE.bottom {
@@ -419,7 +420,7 @@ mod tests {
             []
         );
         assert_eq!(Gaussian::new([50.0, 1e9], [2.0, 2.0], 0.3, 9.0).spans(), []);
-        // Its bounding box reaches a corner of what is visible, but it does not.
+        // Its bounding box reaches a corner of the visible pixels; the ellipse does not.
         assert_eq!(
             Gaussian::new([-22.5, -26.4], [42.0, 0.5], 2.33, 1.3).spans(),
             []
@@ -441,7 +442,7 @@ mod tests {
             for tile in gaussian.reached() {
                 prop_assert!(listed.contains(&tile), "{tile:?} of {gaussian:?}");
             }
-            // A listed tile that no centre reaches is one that the ellipse crosses between centres.
+            // A listed tile without a reached centre is one that the ellipse crosses between centres.
             let extent = (extent.sqrt() + 1.5 / narrow.min(wide)).powi(2);
             let near = Gaussian { extent, ..gaussian }.reached();
             for tile in &listed {

@@ -1,5 +1,5 @@
-//! What of space a picture can show. Planes bound it, and tell in a few operations of Gaussians, alone or in a cluster,
-//! that they are off the screen. The answer is conservative: what is not surely outside is inside.
+//! The frustum: planes that bound the part of space that a picture can show. A few operations show that a Gaussian, or
+//! a cluster of them, is off the screen. The test is conservative: whatever is not certainly outside counts as inside.
 
 mod reach;
 #[cfg(test)]
@@ -13,18 +13,18 @@ use crate::state::gaussian::CameraModel;
 use fearless_simd::{Simd, prelude::*};
 use reach::{Plane, dot};
 
-/// Bounds of binary32's error relative to the sum of the magnitudes of what is summed.
+/// The rounding error of binary32 sums here, relative to the sum of the magnitudes of the terms.
 const ERROR: f64 = 1.0 / 1_048_576.0;
 
-/// The greatest condition of a matrix by which planes are taken to another space.
+/// The greatest condition number of a matrix through which planes are transformed to another space.
 const MAX_CONDITION: f64 = 1e5;
 
-/// Bounds of the Gaussians of a cluster that can be drawn at all.
+/// Bounds of the Gaussians of a cluster. Gaussians that are never drawn are left out.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bounds {
     /// The least coordinates of the means.
     pub(super) low: [f32; 3],
-    /// The greatest.
+    /// The greatest coordinates of the means.
     pub(super) high: [f32; 3],
     /// The greatest scale.
     pub(super) scale: f32,
@@ -32,40 +32,41 @@ pub(super) struct Bounds {
     pub(super) opacity: f32,
 }
 
-/// The planes of a camera.
+/// The planes of a camera that bound Gaussians of limited opacity.
 #[derive(Clone, Debug)]
 pub(super) struct Frustum {
     eye: [f64; 3],
-    /// The camera's axis and the least and greatest depths along it, if depths are measured along it.
+    /// The camera's axis and the least and greatest depths along it; `None` if depths are distances from the eye.
     depth: Option<([f64; 3], f32, f32)>,
-    /// Left, right, top and bottom; none where no plane bounds what is seen.
+    /// The left, right, top and bottom planes; empty if no plane bounds the picture.
     sides: Vec<Plane>,
-    /// Outside of this plane Gaussians are so small that the sides hold for them, if they do not hold for all.
+    /// A plane outside of which Gaussians are small enough for the sides to hold, if they do not hold for all
+    /// Gaussians.
     small: Option<Plane>,
     alpha_floor: f64,
-    /// What rounding may do to a length, relative to it.
+    /// The rounding error of a length, relative to it.
     rounding: f64,
-    /// And besides, however short it is.
+    /// The rounding error of a length that is independent of it.
     displacement: f64,
 }
 
-/// More than binary64's rounding of a few operations, relative to their operands.
+/// A bound of binary64's rounding of a few operations, relative to their operands.
 const ROUNDING: f64 = 1e-12;
 
-/// Why Gaussians are not in a picture.
+/// The reason why Gaussians are not in a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Outside {
-    /// Opacities are below the floor.
+    /// The opacities are below the floor.
     Faint,
-    /// Not beyond the near plane.
+    /// The Gaussians are not beyond the near plane.
     Near,
-    /// Not before the far plane.
+    /// The Gaussians are not before the far plane.
     Far,
-    /// Beside the picture.
+    /// The Gaussians are to the left, right, top or bottom of the picture.
     Beside,
 }
 
-/// GroupF64 that are not in a picture, by the first reason that is found.
+/// The lanes of a group that are not in a picture, by the reason.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct OutsideLanes {
     pub(super) near: Bits,
@@ -98,8 +99,8 @@ impl Frustum {
         }
     }
 
-    /// The same, of Gaussians that a matrix and a translation place in the world, in their own space; `None` if rounding
-    /// makes that uncertain.
+    /// The same frustum in the space of Gaussians that a matrix and a translation place in the world; `None` if the
+    /// matrix is so ill-conditioned that rounding makes the result uncertain.
     pub(super) fn within(&self, (a, b): (Linear, [f64; 3])) -> Option<Self> {
         let (inverse, condition) = inverse(a);
         if condition.is_nan() || condition > MAX_CONDITION {
@@ -107,7 +108,7 @@ impl Frustum {
         }
         let multiply = |a: Linear, v: [f64; 3]| a.map(|row| dot(row, v));
         let transposed = [0, 1, 2].map(|row| a.map(|of| of[row]));
-        // No axis grows by more.
+        // The Frobenius norm: no length grows by more.
         let growth = a.map(|row| dot(row, row)).iter().sum::<f64>().sqrt();
         let rounding = ROUNDING * (1.0 + condition);
         let place = |plane: &Plane| Plane {
@@ -128,7 +129,7 @@ impl Frustum {
         })
     }
 
-    /// Why a whole cluster is outside, if it is.
+    /// The reason why a whole cluster is outside, if it is.
     pub(super) fn excludes(&self, bounds: &Bounds) -> Option<Outside> {
         if f64::from(bounds.opacity) < self.alpha_floor {
             return Some(Outside::Faint);
@@ -139,7 +140,7 @@ impl Frustum {
             middle[axis] = 0.5 * (low + high) - self.eye[axis];
             half[axis] = 0.5 * (high - low);
         }
-        // How far a linear function rises from the middle of the box to a corner, with room for rounding.
+        // The rise of a linear function from the middle of the box to a corner, with a margin for rounding.
         let size = magnitude(middle) + magnitude(half);
         let slack = self.rounding * size + self.displacement;
         let rise = |normal: [f64; 3]| dot(normal.map(f64::abs), half) + magnitude(normal) * slack;
@@ -161,7 +162,8 @@ impl Frustum {
         beside.then_some(Outside::Beside)
     }
 
-    /// Which lanes are outside, found in binary32: those whose error leaves it open are not.
+    /// The lanes that are outside, computed in binary32. Lanes whose result is within the rounding error count as
+    /// inside.
     #[inline(always)]
     pub(super) fn lanes_outside<S: Simd>(
         &self,
@@ -174,7 +176,7 @@ impl Frustum {
         let Some((forward, near, far)) = self.depth else {
             return outside;
         };
-        // The eye in two parts, so that little is lost far from the origin.
+        // The eye is split into two binary32 parts, so that little precision is lost far from the origin.
         let eye = self.eye.map(number);
         let rest = self.eye.map(|eye| eye - f64::from(eye as f32));
         let far_off = number(magnitude(rest));
@@ -218,7 +220,7 @@ impl Frustum {
         outside
     }
 
-    /// Those of the lanes whose Gaussians are so small that the sides hold for them.
+    /// The lanes whose Gaussians are small enough for the sides to hold; `None` if the sides hold for all.
     fn small_lanes(&self, attributes: &Attributes, len: usize) -> Option<Bits> {
         let small = self.small?;
         let mut lanes = Bits::default();

@@ -1,4 +1,4 @@
-//! What there is to project: groups of vertices and clusters, without the clusters that no picture needs.
+//! The groups to project: groups of vertices, and clusters except those that are outside of the picture or hidden.
 
 use super::camera::ViewConstants;
 use super::clusters::{Cluster, Clusters};
@@ -14,8 +14,11 @@ use crate::stats::counters::{Counter, Counters};
 use devmem::host;
 use std::sync::Arc;
 
-/// What is to be projected, in the order of draw, instance and, but for clusters, position in the draw. What is left
-/// out already is counted.
+/// The groups to project, in the order of draw, instance and, except for clusters, position in the draw. The Gaussians
+/// of clusters that are left out are counted.
+///
+/// # Errors
+/// [`SortError::TooManyGaussians`] if there are more groups than [`MAX_GROUPS`].
 pub(super) fn group_tasks<'a>(
     set: &'a GaussianSet,
     clusters: &'a [Option<Arc<Clusters>>],
@@ -30,14 +33,14 @@ pub(super) fn group_tasks<'a>(
     let groups = set.appends.iter().map(groups);
     let groups = groups.chain(set.draws.iter().map(vertex_projection::groups));
     let groups = groups.fold(0, u64::saturating_add);
-    // A picture that repeats has copies on both sides.
+    // A panorama repeats, so that Gaussians have copies on both sides.
     let sides = if constants.period.is_some() { 3 } else { 1 };
     let groups = groups.saturating_mul(sides);
     if groups > MAX_GROUPS {
         return Err(SortError::TooManyGaussians { groups });
     }
     let mut tasks = Vec::new();
-    // There are no more Gaussians than places in groups, so that this stays within 32 bits but at the very end.
+    // There are no more Gaussians than lanes in groups, so that the sum wraps only after the last one, if at all.
     let mut sequence = 0u32;
     for (append, clusters) in set.appends.iter().zip(clusters) {
         let opacity = clusters.as_ref().map_or(1.0, |clusters| clusters.opacity);
@@ -93,16 +96,16 @@ pub(super) fn group_tasks<'a>(
     Ok(tasks)
 }
 
-/// How an instance is seen.
+/// The frustum and the model of an instance.
 struct InstanceView {
     frustum: Arc<Frustum>,
-    /// The same in the instance's own space, unless nothing is certain there.
+    /// The frustum in the instance's own space; `None` if rounding makes it uncertain.
     own: Option<Arc<Frustum>>,
     model: InstanceTransform,
 }
 
 impl InstanceView {
-    /// Of instances whose opacities are at most `opacity`.
+    /// The view of instances without a model whose opacities are at most `opacity`.
     fn new(constants: &ViewConstants, opacity: f32) -> Self {
         let frustum = Arc::new(Frustum::new(constants, opacity));
         Self {
@@ -112,7 +115,7 @@ impl InstanceView {
         }
     }
 
-    /// Of an instance that a model places and fades.
+    /// The view of an instance with a model, whose opacities without the model are at most `opacity`.
     fn of_instance(
         constants: &ViewConstants,
         append: &GaussianAppend,
@@ -132,7 +135,7 @@ impl InstanceView {
         }
     }
 
-    /// Whether a whole cluster is outside; its Gaussians are counted then.
+    /// True if a whole cluster is outside. Its Gaussians are then counted as skipped.
     fn cull_cluster(&self, cluster: &Cluster, counters: &mut Counters) -> bool {
         let mut bounds = cluster.bounds;
         bounds.opacity = self.model.greatest_opacity(bounds.opacity);

@@ -1,25 +1,24 @@
-//! Gaussians that a matrix places in the world, usually one for each instance.
+//! Models: matrices that place Gaussians in the world, usually one for each instance.
 //!
-//! The matrix [A b] takes a mean p to A p + b and a covariance S to A S A^T. What a Gaussian looks like it takes along: the
-//! direction from which it is seen is turned back by the inverse of A, so that what was trained in its own space is seen
-//! there by an eye that moved with it.
+//! The matrix [A b] takes a mean p to A p + b and a covariance S to A S A^T. Spherical harmonics stay in the Gaussians'
+//! own space: the viewing direction is transformed to it by the inverse of A.
 
 use super::attributes::{Fetcher, Group};
 use super::lanes::{Bits, F32_LANES, GROUP, GroupF64};
 use crate::packet::{AttributeStream, GaussianAppend};
 
-/// Matrices by lane, as they are read.
+/// The matrices of a group's Gaussians as they are read, an element per lane.
 #[derive(Clone, Debug)]
 pub(super) struct Matrices {
     pub(super) rows: [[[f32; F32_LANES]; 4]; 3],
-    /// Whether all lanes have the same.
+    /// True if all lanes have the same matrix.
     is_uniform: bool,
 }
 
-/// Rows of a matrix, without the translation.
+/// The rows of a matrix without its translation.
 pub(super) type Linear = [[f64; 3]; 3];
 
-/// What matrices make of the kept Gaussians of a group.
+/// The matrices of the kept Gaussians of a group in binary64, and the viewing directions in the Gaussians' own space.
 #[derive(Clone, Debug)]
 pub(super) struct Placed {
     pub(super) matrix: [[GroupF64; 4]; 3],
@@ -27,16 +26,16 @@ pub(super) struct Placed {
     pub(super) toward: [GroupF64; 3],
 }
 
-/// What a model does to all Gaussians of an instance.
+/// The model of an instance whose model attributes are per instance.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct InstanceTransform {
-    /// The matrix that places them and its translation.
+    /// The rows of the matrix, and its translation.
     pub(super) matrix: Option<(Linear, [f64; 3])>,
     opacity: Option<f32>,
 }
 
 impl InstanceTransform {
-    /// Reads an instance's, whose attributes are by instance.
+    /// Reads the model of an instance. Its attributes must be per instance.
     pub(super) fn read(append: &GaussianAppend, instance: u32) -> Self {
         let mut fetcher = Fetcher::default();
         let group = Group::new(append, instance, 0, 1);
@@ -54,12 +53,12 @@ impl InstanceTransform {
         Self { matrix, opacity }
     }
 
-    /// What no opacity exceeds, if none does `opacity` without the model.
+    /// An upper bound of opacities with the model, if they are at most `opacity` without it.
     pub(super) fn greatest_opacity(&self, opacity: f32) -> f32 {
         match self.opacity {
             None => opacity,
             Some(factor) if factor >= 0.0 => opacity * factor,
-            // What was least is greatest now.
+            // With a negative factor the least opacity becomes the greatest, and it is unknown.
             Some(_) => f32::INFINITY,
         }
     }
@@ -78,7 +77,7 @@ impl Default for Matrices {
 }
 
 impl Matrices {
-    /// Reads a group's.
+    /// Reads a group's matrices.
     pub(super) fn read(
         &mut self,
         fetcher: &mut Fetcher,
@@ -91,7 +90,7 @@ impl Matrices {
         }
     }
 
-    /// The matrix that all lanes have and its translation, if it is one.
+    /// The matrix of all lanes and its translation; `None` if lanes may differ.
     pub(super) fn uniform(&self) -> Option<(Linear, [f64; 3])> {
         let element = |row: usize, column: usize| f64::from(self.rows[row][column][0]);
         let linear = [0, 1, 2].map(|row| [0, 1, 2].map(|column| element(row, column)));
@@ -99,7 +98,7 @@ impl Matrices {
             .then(|| (linear, [0, 1, 2].map(|row| element(row, 3))))
     }
 
-    /// Which of the first `len` lanes are finite.
+    /// The lanes among the first `len` whose matrices are finite.
     pub(super) fn find_finite(&self, len: usize) -> Bits {
         let mut finite = Bits::default();
         for lane in 0..len.min(GROUP) {
@@ -116,13 +115,13 @@ impl Placed {
         [0, 1, 2].map(|row| [0, 1, 2].map(|column| self.matrix[row][column][at]))
     }
 
-    /// Takes a vector from the axes of a kept Gaussian's space to the world's.
+    /// A vector in the axes of a kept Gaussian's space, transformed to the axes of the world.
     pub(super) fn to_world(&self, at: usize, vector: [f64; 3]) -> [f64; 3] {
         self.linear(at).map(|row| dot(row, vector))
     }
 
-    /// Takes a row vector from the world's axes to those of a kept Gaussian's space. It is not a number where the matrix
-    /// is singular.
+    /// A row vector in the world's axes, transformed to the axes of a kept Gaussian's space. NaN if the matrix is
+    /// singular.
     pub(super) fn row_from_world(&self, at: usize, row: [f64; 3]) -> [f64; 3] {
         let a = self.linear(at);
         if is_singular(a) {
@@ -140,7 +139,8 @@ fn is_singular(a: Linear) -> bool {
     !regular
 }
 
-/// The inverse of a matrix, and its condition: the product of both matrices' norms. Neither is a number where there is none.
+/// The inverse of a matrix and its condition number, the product of both matrices' Frobenius norms. Neither is finite
+/// for a matrix of determinant zero.
 pub(super) fn inverse(a: Linear) -> (Linear, f64) {
     let columns = cofactors(a);
     let determinant = dot(a[0], columns[0]);

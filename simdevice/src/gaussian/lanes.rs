@@ -1,20 +1,20 @@
-//! A group's lanes: numbers, sets of lanes, and the logarithm.
+//! The lanes of a group: arrays of numbers, sets of lanes, and the binary logarithm.
 
 use fearless_simd::{Simd, prelude::*};
 
-/// Gaussians per group: what preprocessing holds in its caches at a time.
+/// The Gaussians of a group. The working set of preprocessing one group fits into the processor's caches.
 pub(super) const GROUP: usize = 256;
 
-/// A number for each Gaussian of a group.
+/// A binary64 number for each Gaussian of a group.
 ///
-/// Some thirty of these are walked side by side: a cache line more than a power of two keeps them from
-/// competing for the same few sets of the first-level cache.
+/// Some thirty of these arrays are read in parallel. With a cache line more than a power of two they do not compete for
+/// the same sets of the first-level cache.
 pub(super) type GroupF64 = [f64; GROUP + 8];
 
-/// GroupF64 before anything is known of them.
+/// A zero for each Gaussian of a group.
 pub(super) const NO_GROUP_F64: GroupF64 = [0.0; GROUP + 8];
 
-/// GroupF64 of what is read: attributes as they are, which their readers walk one after the other.
+/// The length of arrays of binary32 attributes. They are read one after the other, so they need no padding.
 pub(super) const F32_LANES: usize = GROUP;
 
 const WORDS: usize = GROUP / 64;
@@ -24,7 +24,7 @@ const WORDS: usize = GROUP / 64;
 pub(super) struct Bits([u64; WORDS]);
 
 impl Bits {
-    /// GroupF64 `0..len`.
+    /// The lanes `0..len`.
     pub(super) fn first(len: usize) -> Self {
         let mut bits = Self::default();
         for (number, word) in bits.0.iter_mut().enumerate() {
@@ -38,19 +38,19 @@ impl Bits {
         bits
     }
 
-    /// Adds the lanes of `mask`, whose first is lane `at`, a multiple of the mask's width.
+    /// Adds the lanes of `mask`. The first of them is lane `at`, a multiple of the mask's width.
     #[inline(always)]
     pub(super) fn set<S: Simd, M: SimdMask<S>>(&mut self, at: usize, mask: M) {
         self.0[at / 64 % WORDS] |= mask.to_bitmask() << (at % 64);
     }
 
-    /// Whether a lane is among them.
+    /// True if the set contains `lane`.
     #[inline(always)]
     pub(super) fn has(&self, lane: usize) -> bool {
         self.0[lane / 64 % WORDS] >> (lane % 64) & 1 == 1
     }
 
-    /// Of the lanes from `at` on, a multiple of `len`, which divides 64: a bit for each of `len`.
+    /// The bits of `len` lanes from `at` on. `len` divides 64, and `at` is a multiple of it.
     #[inline(always)]
     pub(super) fn group(&self, at: usize, len: usize) -> u64 {
         self.0[at / 64 % WORDS] >> (at % 64) & (u64::MAX >> (64 - len))
@@ -62,7 +62,7 @@ impl Bits {
         self.0[lane / 64 % WORDS] |= u64::from(member) << (lane % 64);
     }
 
-    /// The lanes in both.
+    /// The intersection of both sets.
     pub(super) fn and(mut self, other: &Self) -> Self {
         for (word, other) in self.0.iter_mut().zip(other.0) {
             *word &= other;
@@ -70,7 +70,7 @@ impl Bits {
         self
     }
 
-    /// The lanes that `other` lacks.
+    /// The lanes of this set that are not in `other`.
     pub(super) fn without(mut self, other: &Self) -> Self {
         for (word, other) in self.0.iter_mut().zip(other.0) {
             *word &= !other;
@@ -78,7 +78,7 @@ impl Bits {
         self
     }
 
-    /// How many lanes there are.
+    /// The number of lanes.
     pub(super) fn count(&self) -> u64 {
         self.0.iter().map(|word| u64::from(word.count_ones())).sum()
     }
@@ -96,23 +96,23 @@ impl Bits {
     }
 }
 
-/// Base-2 logarithm, to 1e-13, of positive normal numbers below 2^1000; negative infinity of others.
+/// The base-2 logarithm of positive normal numbers below 2^1000, to 1e-13; negative infinity for other numbers.
 #[inline(always)]
 pub(super) fn log2<S: Simd>(simd: S, x: S::f64s) -> S::f64s {
     let number = |value: f64| S::f64s::splat(simd, value);
     let bits: S::u64s = x.bitcast();
-    // The mantissa is taken in [sqrt(1/2), sqrt(2)): less the bits of sqrt(1/2), the exponent field tells.
+    // The mantissa is taken in [sqrt(1/2), sqrt(2)): subtracting the bits of sqrt(1/2) makes the exponent field match.
     let bias = S::u64s::splat(simd, 1023 << 52);
     let sqrt_half = S::u64s::splat(simd, std::f64::consts::FRAC_1_SQRT_2.to_bits());
     let biased = (bits - sqrt_half + bias) >> 52;
     let mantissa: S::f64s = (bits - (biased << 52) + bias).bitcast();
-    // Set below the point of 2^52, an integer becomes a number without a conversion.
+    // The integer in the low bits of 2^52 becomes a number without a conversion.
     let shifter = number(4_503_599_627_370_496.0);
     let shifted: S::f64s = (biased | shifter.bitcast::<S::u64s>()).bitcast();
     let exponent = shifted - shifter - 1023.0;
     let s = (mantissa - 1.0) / (mantissa + 1.0);
     let s2 = s * s;
-    // log2(m) = 2 / ln 2 (s + s^3 / 3 + s^5 / 5 + ...), |s| < 0.1716: what is left out is below 1e-15.
+    // log2(m) = 2 / ln 2 (s + s^3 / 3 + s^5 / 5 + ...), |s| < 0.1716: the omitted terms are below 1e-15.
     let mut series = number(1.0 / 17.0);
     for denominator in [15.0, 13.0, 11.0, 9.0, 7.0, 5.0, 3.0, 1.0] {
         series = series * s2 + 1.0 / denominator;

@@ -1,9 +1,10 @@
 //! Gaussian draws: from vertex attributes to a binned, depth-sorted set that the tile engine renders.
 //!
-//! [`sort_and_bin`] is the walk, a stage after the other, each in a module: [`reuse`] (a set that is still as it was),
-//! [`cluster_cache`] and [`clusters`] (neighbours with bounds), [`occlusion`] (what others hide), [`group_tasks`] (what is
-//! left to do), [`preprocess`] (3D to the rasterizer's nine numbers, tiles, colours and keys; [`vertex_projection`] where a
-//! vertex program does it), [`depth_order`], [`tile_lists`], [`sorted_set`] (what is drawn).
+//! [`sort_and_bin`] runs the stages in turn, each in a module: [`reuse`] (an unchanged set is not made again),
+//! [`cluster_cache`] and [`clusters`] (neighbours in space with common bounds), [`occlusion`] (clusters that others
+//! hide), [`group_tasks`] (the groups that remain), [`preprocess`] (projection to the rasterizer's nine numbers, tiles,
+//! colours and keys; [`vertex_projection`] where a vertex program projects), [`depth_order`], [`tile_lists`],
+//! [`sorted_set`] (the result).
 
 mod attributes;
 pub mod caches;
@@ -57,13 +58,13 @@ use std::sync::Arc;
 use std::time::Instant;
 use tile_lists::TileLists;
 
-/// The least groups that a worker takes where little is done for each.
+/// The least number of groups per task, where little is done for each group.
 const LEAST_GROUPS: usize = 64;
 
-/// Preprocesses, sorts and bins a set, unless it is still there from when it was last drawn.
+/// Preprocesses, sorts and bins a set, unless the cache still has the result of an equal one.
 ///
 /// # Errors
-/// [`SortError`] if the set exceeds what 32 bits can name, or a vertex program runs for too long.
+/// [`SortError`] if the set exceeds what 32 bits can number, or a vertex program runs for too long.
 pub fn sort_and_bin(
     set: GaussianSet,
     runtime: &Runtime,
@@ -82,7 +83,8 @@ pub fn sort_and_bin(
         counters.add(Counter::SetsUnchanged, 1);
         return Ok(BinnedDraw::new(set, sorted, None, runtime));
     }
-    // All of it by workers: for each way from this thread to them and back, threads fall asleep and are woken.
+    // All of it runs on the workers, because each change from this thread to them and back puts threads to sleep and
+    // wakes them.
     let (sorted, record) = runtime.install(|| sort(&set, &clusters, runtime, counters))?;
     let sorted = Arc::new(sorted);
     if let Some(key) = key {
@@ -93,19 +95,18 @@ pub fn sort_and_bin(
     Ok(BinnedDraw::new(set, sorted, record, runtime))
 }
 
-/// What preprocessing makes of a set.
+/// The result of preprocessing a set.
 struct Preprocessed {
-    /// Those that the device projected, then those of vertex programs.
+    /// The groups that the device projected, then those of vertex programs.
     groups: Vec<ProjectedGroup>,
-    /// How many of them the device projected.
+    /// The number of groups that the device projected.
     fixed: usize,
-    /// What became of the Gaussians that the device projected, and of those of vertex programs.
+    /// The counts of the groups that the device projected. `by_programs` has those of vertex programs.
     by_device: Counters,
     by_programs: Counters,
 }
 
-/// Preprocesses, sorts and bins; and begins an account of it, if anybody wants to
-/// know.
+/// Preprocesses, sorts and bins a set. If a recorder is present, it also returns a record of the work.
 fn sort(
     set: &GaussianSet,
     clusters: &[Option<Arc<Clusters>>],
@@ -118,7 +119,7 @@ fn sort(
     let threads = runtime.threads();
     let pairs = depth_order::sorted(&preprocessed.groups, threads);
     let sorted = Instant::now();
-    // Twelve bytes a pair while lists are made: four times the budget of all lists of a pass.
+    // A pair takes twelve bytes while lists are built: four times the budget of all lists of a pass.
     let most_pairs = runtime.config().bin_budget_bytes / 3;
     let groups = &mut preprocessed.groups;
     let tiles = TileLists::build(groups, &pairs, set.bounds, threads, most_pairs);
@@ -159,7 +160,8 @@ fn sort(
     Ok((sorted_set, record))
 }
 
-/// Preprocesses what has attributes, but for what is left out with its cluster, and what vertex programs project.
+/// Preprocesses the Gaussians that have attributes, except those culled with their clusters, and those that vertex
+/// programs project.
 fn preprocess_set(
     set: &GaussianSet,
     clusters: &[Option<Arc<Clusters>>],
@@ -203,7 +205,7 @@ fn preprocess_set(
     })
 }
 
-/// What all groups counted.
+/// The sum of all groups' counters.
 fn counted(groups: &[ProjectedGroup]) -> Counters {
     let add = |mut sum: Counters, more: &Counters| {
         sum.add_all(more);

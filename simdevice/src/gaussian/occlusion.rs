@@ -1,7 +1,8 @@
-//! Gaussians behind others that leave no light for them. Large opaque ones, occluders, are projected first, and followed front
-//! to back: each takes of a tile's light at least what it takes of the pixel that it covers least. Where a tile's pixels are
-//! all finished by then, nothing farther away contributes to it, whatever else is drawn; what reaches only such tiles is
-//! hidden. The answer is conservative, and the picture the same.
+//! Occlusion culling: finds Gaussians behind others through which no visible transmittance is left. Occluders, which
+//! are large and opaque, are projected first and blended front to back: each multiplies a tile's transmittance by that
+//! of the pixel that it covers least. Where all pixels of a tile are finished, nothing farther away contributes to the
+//! tile, whatever else is drawn. A Gaussian that reaches only such tiles is hidden. The test is conservative, and the
+//! picture stays the same.
 
 use super::attributes::Attributes;
 use super::camera::ViewConstants;
@@ -23,34 +24,36 @@ use crate::stats::optimizations::Optimization;
 use devmem::host;
 use std::sync::Arc;
 
-/// Regions of a picture along each axis: what is hidden is known of each.
+/// The number of regions of a picture along each axis. Each has its own depth beyond which everything is hidden.
 const REGIONS: usize = 8;
 
-/// Screens are at least as wide in the picture, in pixels: smaller ones cover no tile.
+/// The least deviation of an occluder in the picture, in pixels. Smaller ones cover no tile.
 const LEAST_DEVIATION: f64 = 10.0;
 
-/// What takes less of a tile is not followed.
+/// The least alpha in a tile for which an occluder is blended there.
 const LEAST_ALPHA: f64 = 0.2;
 
-/// What following occluders may cost for each tile, in units of what it costs to see that a tile is finished.
+/// The cost of blending occluders that is allowed for each tile. The unit is the cost of a test whether a tile is
+/// finished.
 const COST_PER_TILE: usize = 512;
 
-/// What it costs to find what an occluder takes of a tile, in the same units.
+/// The cost of blending an occluder into a tile, in the same unit.
 const TAKING: usize = 8;
 
-/// What rounding may do to an alpha and to a product of many, relative to it.
+/// The relative rounding error of an alpha and of a product of many.
 const MARGIN: f64 = 1e-3;
 
-/// What is hidden.
+/// The part of space that occluders leave visible.
 pub(super) struct OcclusionMap {
-    /// The whole picture, as far as anything is seen.
+    /// The whole picture, up to the farthest visible depth.
     whole: Frustum,
-    /// Its parts, each as far as anything is seen there.
+    /// The regions of the picture, each up to its farthest visible depth.
     regions: Vec<Frustum>,
 }
 
 impl OcclusionMap {
-    /// Whether nothing of a cluster is seen that is not placed by a model; its Gaussians are counted then.
+    /// True if nothing of a cluster is visible. Its Gaussians are then counted as hidden. The cluster must not have a
+    /// model.
     pub(super) fn cull_cluster(&self, cluster: &Cluster, counters: &mut Counters) -> bool {
         if !self.hides(&cluster.bounds) {
             return false;
@@ -67,7 +70,7 @@ impl OcclusionMap {
     }
 }
 
-/// What occluders hide; `None` if that is nothing, or not to be known.
+/// The occlusion map of a set; `None` if nothing is hidden, or the mode does not allow it.
 pub(super) fn find(
     set: &GaussianSet,
     preprocessor: &Preprocessor<'_>,
@@ -106,7 +109,7 @@ pub(super) fn find(
     light.occlusion(constants, clusters)
 }
 
-/// Whether a finished pixel is all that it takes for what is farther away not to be seen.
+/// True if, in this mode, a finished pixel hides everything that is farther away.
 fn may_hide(set: &GaussianSet, preprocessor: &Preprocessor<'_>) -> bool {
     let state = &set.begin.state;
     let is_along_axis = matches!(
@@ -114,26 +117,26 @@ fn may_hide(set: &GaussianSet, preprocessor: &Preprocessor<'_>) -> bool {
         CameraModel::Pinhole | CameraModel::Orthographic
     );
     preprocessor.constants.optimizations.has(Optimization::OcclusionCulling)
-        // What was recorded is what hardware without this does.
+        // A recording describes hardware without this optimization.
         && preprocessor.runtime.recorder().is_none()
         && is_along_axis
         && state.order == GaussianOrder::ViewDepth
         && state.geometry == GaussianGeometry::Volume
         && state.precision == GaussianPrecision::Float32
         && least_light(state) > 0.0
-        // What is tested may not take the light that it could.
+        // With depth or stencil tests an occluder may be rejected.
         && state.depth_stencil == DepthStencil::default()
         && set.resolve.is_none()
         && !set.bounds.is_empty()
 }
 
-/// What is behind less light than this is not drawn.
+/// The transmittance below which nothing more is drawn.
 fn least_light(state: &GaussianState) -> f32 {
     let budget = state.approximation.contribution_budget;
     state.transmittance_floor.max(budget)
 }
 
-/// The occluders of clusters that may be wide enough in the picture, packed.
+/// The clusters' occluders that may be wide enough in the picture, packed into new clusters.
 fn large_occluders(
     constants: &ViewConstants,
     frustum: &Frustum,
@@ -156,7 +159,7 @@ fn large_occluders(
     packed
 }
 
-/// Whether a Gaussian is about as wide as occluders are.
+/// True if a Gaussian is approximately as wide in the picture as an occluder must be.
 fn is_large(constants: &ViewConstants, attributes: &Attributes, lane: usize) -> bool {
     let mut per_unit = constants.focal[0].abs().max(constants.focal[1].abs());
     if constants.model == CameraModel::Pinhole {
@@ -175,19 +178,19 @@ fn is_large(constants: &ViewConstants, attributes: &Attributes, lane: usize) -> 
     f64::from(attributes.second_scale(lane)) * per_unit >= LEAST_DEVIATION
 }
 
-/// What light is left of each tile of a picture.
+/// The transmittance of each tile of a picture.
 struct TileTransmittance {
     bounds: Rect,
-    /// The first column and row of tiles, and how many.
+    /// The first column and row of tiles.
     first: [u32; 2],
     count: [u32; 2],
-    /// No pixel of the tile has more.
+    /// An upper bound of the transmittance of the tile's pixels.
     left: Vec<f64>,
-    /// The depth of what finished the tile, or infinity.
+    /// The depth of the occluder that finished the tile, or infinity.
     depth: Vec<f32>,
-    /// Pixels with less light are finished.
+    /// The transmittance below which pixels are finished.
     floor: f64,
-    /// The greatest alpha, and what is taken for the least.
+    /// The alpha ceiling, and the least alpha that is blended.
     alphas: [f64; 2],
 }
 
@@ -214,7 +217,7 @@ impl TileTransmittance {
         }
     }
 
-    /// Lets occluders take light, front to back.
+    /// Blends occluders front to back.
     fn pass(&mut self, groups: &[ProjectedGroup]) {
         let mut order = Vec::new();
         for (number, group) in groups.iter().enumerate() {
@@ -251,7 +254,7 @@ impl TileTransmittance {
         }
     }
 
-    /// The columns and rows of the tiles of which an occluder may take enough.
+    /// The columns and rows of the tiles of which an occluder may cover enough.
     fn covered(&self, splat: &Splat) -> [std::ops::Range<u32>; 2] {
         let [a, b, c] = splat.factor;
         let extent = f64::from(splat.log2_opacity) - self.alphas[1].log2();
@@ -259,7 +262,7 @@ impl TileTransmittance {
         let half = [half, half * a.hypot(b) / c.abs()];
         let along = |axis: usize| {
             let tile = |pixel: f64| pixel / f64::from(TILE_SIZE) - f64::from(self.first[axis]);
-            // Centres are half a pixel within.
+            // Pixel centres are half a pixel inside the tile.
             let first = tile(splat.mean[axis] - half[axis] - 0.5).ceil();
             let end = tile(splat.mean[axis] + half[axis] + 0.5).floor();
             let within = |tile: f64| tile.clamp(0.0, self.count[axis].into()) as u32;
@@ -268,7 +271,7 @@ impl TileTransmittance {
         [along(0), along(1)]
     }
 
-    /// What an occluder takes of a tile.
+    /// Multiplies a tile's transmittance by what an occluder leaves of it.
     fn attenuate(&mut self, splat: &Splat, key: u32, [column, row]: [u32; 2]) {
         let tile = (row * self.count[0] + column) as usize;
         let [first_column, first_row] = self.first;
@@ -282,7 +285,8 @@ impl TileTransmittance {
         }
     }
 
-    /// What is hidden, if any region is finished; of clusters that may be as opaque as these.
+    /// The map of the hidden space, if any region is finished. It is valid for clusters of at most these clusters'
+    /// opacities.
     fn occlusion(
         &self,
         constants: &ViewConstants,
@@ -293,7 +297,7 @@ impl TileTransmittance {
         let frustum_up_to = |farthest: f32, visible: Visible| {
             let mut constants = constants.clone();
             constants.visible = visible;
-            // What is as far comes before or after.
+            // Gaussians at the same depth may come before or after.
             constants.far = constants.far.min(farthest.next_up());
             Frustum::new(&constants, opacity)
         };
@@ -337,9 +341,9 @@ impl TileTransmittance {
     }
 }
 
-/// Whether a splat may take light of a whole tile.
+/// True if a splat may cover a whole tile.
 fn reaches_far(splat: &Splat) -> bool {
-    // In units of the exponent, a tile's middle to its corners.
+    // The distance from a tile's middle to its edges, in units of the exponent.
     let [a, _, c] = splat.factor.map(f64::abs);
     !splat.exceeds_period && a.max(c) * LEAST_DEVIATION < 1.5
 }

@@ -1,22 +1,23 @@
-//! Pictures that repeat: a panorama's right edge goes on at its left one.
+//! Panoramas: pictures that repeat horizontally, so that the right edge continues at the left one.
 //!
-//! Every Gaussian is drawn where it is and, where that reaches the picture, a period to the right and to the left. A
-//! pixel counts one of the three at most: that whose mean is less than half a period away. Ellipses that are narrower
-//! than the period see to that themselves; wider ones are marked ([`Splat::wide`]) and cut off by the tile engine.
+//! Every Gaussian is drawn at its place and, where that reaches the picture, a period to the right and to the left. A
+//! pixel counts at most one of the three: that whose mean is less than half a period away. Ellipses that are narrower
+//! than the period ensure that themselves. Wider ones are marked ([`Splat::exceeds_period`]) and cut off by the tile
+//! engine.
 //!
-//! [`Splat::wide`]: super::project::Splat::wide
+//! [`Splat::exceeds_period`]: super::splat::Splat::exceeds_period
 
 use super::footprint::{Ellipse, TileFootprint, Visible};
 use super::splat::ProjectedGroup;
 use devmem::host;
 
-/// The sides to which Gaussians are copied: right and left.
+/// The directions in which Gaussians are copied: right and left.
 const SIDES: [f64; 2] = [1.0, -1.0];
 
-/// What lies within half a period of a mean at `x`, with a pixel to spare.
+/// The visible pixels within half a period of a mean at `x`, and a pixel more on each side.
 fn near(visible: &Visible, x: f64, period: f64) -> Visible {
     let half = 0.5 * period + 1.0;
-    // However far outside, there is no pixel but the visible ones.
+    // Outside of the visible range there are no pixels, however far `x` is.
     let pixel = |x: f64| (x as i64).clamp(visible.left, visible.right);
     Visible {
         left: pixel((x - half).floor()),
@@ -25,8 +26,8 @@ fn near(visible: &Visible, x: f64, period: f64) -> Visible {
     }
 }
 
-/// The tiles that a Gaussian and its copies reach, if there are any. Copies that reach some are added to `copies`; where
-/// only they do, the Gaussian itself reaches no tiles.
+/// The tiles that a Gaussian and its copies reach, or `None` if there are none. Copies that reach tiles are added to
+/// `copies` as Gaussian, side and footprint. If only copies reach tiles, the Gaussian's own footprint is empty.
 pub(super) fn reach(
     at: usize,
     ellipse: &Ellipse,
@@ -56,8 +57,8 @@ pub(super) fn reach(
     reach.or(by_copies)
 }
 
-/// Appends the copies of the kept Gaussian `at`, the last one of `out`, and takes them from `copies`, which also holds
-/// those of Gaussians that were skipped before it.
+/// Appends the copies of the kept Gaussian `at`, the last one of `out`, and removes them from `copies`. Copies of
+/// Gaussians that were skipped before it are removed, too.
 pub(super) fn copy_last(
     at: usize,
     period: f64,
@@ -74,15 +75,15 @@ pub(super) fn copy_last(
         splat.mean[0] += SIDES[side] * period;
         let to = &mut out.copies[side];
         to.splats.push(splat);
-        // The same Gaussian lies as deep along a pixel's ray.
+        // A copy has the same depth along a pixel's ray.
         to.ray_depths.extend(out.ray_depths.last().copied());
         to.keys.push(key);
         to.reaches.push(reach);
     }
 }
 
-/// Makes groups of the copies, behind all others. Copies have the keys and the places in the order of what they are
-/// copies of; since no pixel counts two of them, their order among themselves is of no account.
+/// Moves the copies to groups of their own after all others. A copy has the key and sequence number of its original. No
+/// pixel counts two of them, so their order among themselves does not matter.
 pub(super) fn append_copies(groups: &mut Vec<ProjectedGroup>) {
     let copies = groups
         .iter_mut()
@@ -154,7 +155,7 @@ mod tests {
         assert_eq!(tiles(50.0, 5.0), [vec![2, 3], nothing(), nothing()]);
         assert_eq!(tiles(2.0, 5.0), [vec![0], vec![6], nothing()]);
         assert_eq!(tiles(99.0, 5.0), [vec![5, 6], nothing(), vec![0]]);
-        // Its own place is outside of the picture.
+        // Its mean is outside of the picture.
         assert_eq!(tiles(-30.0, 5.0), [nothing(), vec![4], nothing()]);
         assert_eq!(tiles(-200.0, 5.0), [nothing(), nothing(), nothing()]);
     }

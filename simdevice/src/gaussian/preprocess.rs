@@ -1,9 +1,10 @@
-//! Preprocessing: Gaussians of a group to the rasterizer's nine numbers, with their tiles, colours and keys.
+//! Preprocessing: projects the Gaussians of a group to the rasterizer's nine numbers, with their tiles, colours and
+//! keys.
 //!
-//! Everything from the camera-space mean to the conic is computed in binary64 and rounded once at the end: in
-//! binary32 the determinant of a needle and the depth of neighbours are wrong in the fourth digit. What is
-//! culled leaves before the covariance is computed, and spherical harmonics are read only for what reaches a
-//! tile. No fused operations are used, so that keys and means are the same bits at every SIMD level.
+//! Everything from the camera-space mean to the conic is computed in binary64 and rounded once at the end: in binary32
+//! the determinant of a very thin Gaussian and the depth of neighbours are wrong in the fourth digit. Gaussians are
+//! culled before the covariance is computed, and spherical harmonics are read only for Gaussians that reach a tile. No
+//! fused operations are used, so that keys and means have the same bits at every SIMD level.
 
 use super::attributes::{Attributes, CoefficientReader, Fetcher, Group, Harmonics};
 use super::camera::{LN_2, ViewConstants};
@@ -31,28 +32,28 @@ use fearless_simd::{Simd, prelude::*};
 use rayon::prelude::*;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// The most groups that a worker takes at a time: the last ones are waited for.
+/// The most groups per task of a worker. Larger tasks make workers wait for the last one.
 const GROUPS_PER_TASK: usize = 4;
 
-/// A group of Gaussians that were read.
+/// The attributes of a group of Gaussians.
 pub(super) struct Source<'a> {
-    /// What reads their colours.
+    /// The reader of the Gaussians' spherical harmonics.
     pub(super) reader: CoefficientReader<'a>,
     pub(super) group: Group<'a>,
     pub(super) attributes: &'a Attributes,
-    /// Matrices that place them in the world, if it is not their own space.
+    /// The model matrices of the Gaussians, if there are any.
     pub(super) matrices: Option<&'a Matrices>,
-    /// None is skipped for what its attributes are.
+    /// True if all attributes are valid, so that no Gaussian is skipped because of them.
     pub(super) is_sound: bool,
-    /// Their spherical harmonics, if they were read already.
+    /// The spherical harmonics of the Gaussians, if they are in host memory already.
     pub(super) harmonics: Harmonics<'a>,
-    /// What bounds those that can be seen; `None` tells nothing of them.
+    /// The frustum for culling; `None` if they are not culled.
     pub(super) frustum: Option<&'a Frustum>,
 }
 
 impl Source<'_> {
-    /// Has the spherical harmonics of degrees 0 to `degree` of some lanes, those with a bit in `kept`, on their way while other
-    /// things are computed.
+    /// Starts to load the spherical harmonics of degrees 0 to `degree` into the processor's cache, for the lanes that
+    /// have a bit in `kept`.
     #[inline(always)]
     fn prefetch_harmonics(&self, degree: u32, lanes: &[usize], kept: u64) {
         let count = coefficient_count(degree);
@@ -74,7 +75,7 @@ impl Source<'_> {
     }
 }
 
-/// Projects a group. `sequence` tells of each of its Gaussians which of the set it is.
+/// Projects a group and appends the result to `out`. `sequence` maps a lane to its Gaussian's number in the set.
 #[inline(always)]
 pub(super) fn project<S: Simd>(
     view: &ViewConstants,
@@ -87,7 +88,7 @@ pub(super) fn project<S: Simd>(
     let counters = &mut out.counters;
     counters.add(Counter::GaussiansRead, source.group.len as u64);
     let kept = cull(view, simd, source, counters);
-    // What was not kept is projected all the same where that is cheap, and where nothing comes of whatever it is.
+    // In simple modes lanes that were culled are projected, too: that is cheap, and the results are not used.
     let is_plain = view.model == CameraModel::Pinhole
         && view.geometry == GaussianGeometry::Volume
         && view.precision == GaussianPrecision::Float32
@@ -101,7 +102,7 @@ pub(super) fn project<S: Simd>(
     emit(view, simd, source, scratch, sequence, out);
 }
 
-/// Finds which lanes have finite spherical harmonics, of all that the group holds.
+/// The lanes with finite spherical harmonics. Reads the coefficients of all lanes.
 #[inline(always)]
 fn find_colored<S: Simd>(view: &ViewConstants, simd: S, source: &Source<'_>) -> Bits {
     let reader = &source.reader;
@@ -116,7 +117,7 @@ fn find_colored<S: Simd>(view: &ViewConstants, simd: S, source: &Source<'_>) -> 
     colored
 }
 
-/// Finds which lanes nothing is known against yet, and counts the first reason to skip the others.
+/// The lanes that no test culls. Counts the others by the first reason to skip them.
 #[inline(always)]
 fn cull<S: Simd>(
     view: &ViewConstants,
@@ -159,7 +160,7 @@ fn cull<S: Simd>(
     kept
 }
 
-/// Which lanes' opacities reach the alpha floor.
+/// The lanes whose opacities reach the alpha floor.
 #[inline(always)]
 fn find_bright<S: Simd>(
     view: &ViewConstants,
@@ -168,7 +169,7 @@ fn find_bright<S: Simd>(
     len: usize,
 ) -> Bits {
     let mut bright = Bits::default();
-    // The floor is binary32 in the first place.
+    // The floor was binary32 originally.
     let floor = S::f32s::splat(simd, view.alpha_floor as f32);
     for at in (0..len).step_by(S::f32s::LEN) {
         let o = S::f32s::from_slice(simd, &attributes.opacity[at..at + S::f32s::LEN]);
@@ -177,7 +178,7 @@ fn find_bright<S: Simd>(
     bright
 }
 
-/// Finds the place of the kept Gaussians in camera space.
+/// Computes the positions of the kept Gaussians in camera space.
 #[inline(always)]
 fn place<S: Simd>(view: &ViewConstants, simd: S, scratch: &mut Scratch) {
     let r = view.rotation;
@@ -203,7 +204,7 @@ fn place<S: Simd>(view: &ViewConstants, simd: S, scratch: &mut Scratch) {
     }
 }
 
-/// Computes mean, covariance and opacity on the screen of the kept Gaussians.
+/// Computes mean, covariance and opacity in the picture for the kept Gaussians.
 #[inline(always)]
 fn flatten<S: Simd>(view: &ViewConstants, simd: S, source: &Source<'_>, scratch: &mut Scratch) {
     let by_matrices = source.matrices.is_some();
@@ -249,7 +250,7 @@ fn flatten<S: Simd>(view: &ViewConstants, simd: S, source: &Source<'_>, scratch:
         source.prefetch_harmonics(view.sh_degree, &scratch.lanes[at..end], kept);
         let [w, x] = [load(&rotation[0], at), load(&rotation[1], at)];
         let [y, z] = [load(&rotation[2], at), load(&rotation[3], at)];
-        // What was binary32 can be squared in binary64, whatever its size.
+        // Squares of binary32 numbers are in binary64's range.
         let double = two / (w * w + x * x + y * y + z * z);
         let [dx, dy, dz] = [double * x, double * y, double * z];
         let (xx, yy, zz) = (dx * x, dy * y, dz * z);
@@ -317,7 +318,7 @@ fn flatten<S: Simd>(view: &ViewConstants, simd: S, source: &Source<'_>, scratch:
     }
 }
 
-/// Quaternions, the scalar taken to be where it is not.
+/// Quaternions with the scalar last instead of first, if that mistake is made.
 #[cfg(feature = "mistakes")]
 fn mistaken_rotation(rotation: &[GroupF64; 4]) -> [GroupF64; 4] {
     let [w, x, y, z] = *rotation;
@@ -328,8 +329,9 @@ fn mistaken_rotation(rotation: &[GroupF64; 4]) -> [GroupF64; 4] {
     }
 }
 
-/// What the tile engine and the search for tiles need of Gaussians from lane `at` on, given their covariances on the
-/// screen before the low-pass filter (xx, xy, yy), the determinants of those, and opacities.
+/// Computes the numbers that rasterization and the search for tiles need, for Gaussians from lane `at` on. The inputs
+/// are the covariances in the picture before the low-pass filter (xx, xy, yy) in px^2, their determinants, and
+/// opacities.
 #[inline(always)]
 pub(super) fn shape<S: Simd>(
     view: &ViewConstants,
@@ -367,8 +369,8 @@ pub(super) fn shape<S: Simd>(
         flat.steep = Bits::default();
     }
     flat.steep.set(at, are_steep::<S>(factor, log2_opacity));
-    // The tile engine evaluates the exponent in binary32: a margin wider than its error keeps every
-    // pixel that it would accept. What cannot reach the floor even so has a negative extent.
+    // The tile engine evaluates the exponent in binary32. A margin wider than its error keeps every pixel that it would
+    // accept. Gaussians that still cannot reach the floor have a negative extent.
     let room = log2_opacity - view.log2_floor;
     let mut extent = (room + room.abs() * 1e-5 + 1e-3) * (2.0 * LN_2);
     if view.precision == GaussianPrecision::Float16 {
@@ -391,7 +393,7 @@ pub(super) fn shape<S: Simd>(
     store(b * per_a * half_x, &mut flat.peak);
 }
 
-/// Finds the place of the kept Gaussians in camera space, and from where they are seen in their own.
+/// Computes the positions of the kept Gaussians in camera space, and the viewing directions in their own space.
 pub(super) fn place_by_matrices(view: &ViewConstants, scratch: &mut Scratch) {
     let Some(placed) = &mut scratch.placed else {
         return;
@@ -403,7 +405,7 @@ pub(super) fn place_by_matrices(view: &ViewConstants, scratch: &mut Scratch) {
         let d =
             [0, 1, 2].map(|axis| dot(a[axis], p) + (placed.matrix[axis][3][at] - view.eye[axis]));
         let t = [0, 3, 6].map(|row| d[0] * r[row] + d[1] * r[row + 1] + d[2] * r[row + 2]);
-        // The columns of the inverse, but for the determinant's magnitude.
+        // The columns of the inverse, times the determinant. Only its sign matters for directions.
         let columns = cofactors(a);
         let sign = dot(a[0], columns[0]).signum();
         for axis in 0..3 {
@@ -416,7 +418,7 @@ pub(super) fn place_by_matrices(view: &ViewConstants, scratch: &mut Scratch) {
     }
 }
 
-/// Depths, means and Jacobians of the kept Gaussians, unless a pinhole sees the world itself.
+/// Computes depths, means and Jacobians of the kept Gaussians, for all modes but a pinhole without models.
 pub(super) fn linearize_group(view: &ViewConstants, by_matrices: bool, scratch: &mut Scratch) {
     let [x, y, z] = &*scratch.camera;
     let placed = scratch.placed.as_deref().filter(|_| by_matrices);
@@ -440,14 +442,14 @@ pub(super) fn linearize_group(view: &ViewConstants, by_matrices: bool, scratch: 
     }
 }
 
-/// A kept lane's depth as the attachment holds it.
+/// A kept lane's depth in the encoding of the depth attachment.
 #[inline(always)]
 fn center_depth(view: &ViewConstants, at: usize, scratch: &Scratch) -> u32 {
     view.depth
         .map_or(0, |depth| depth.code(scratch.depth[at] as f32))
 }
 
-/// Finds what each lane is sorted by, and which of the set it is.
+/// Computes the sort key and the sequence number of each kept lane.
 #[inline(always)]
 fn find_keys(view: &ViewConstants, sequence: impl Fn(usize) -> u32, scratch: &mut Scratch) {
     let [keys, sequences] = &mut *scratch.keys;
@@ -470,12 +472,12 @@ fn find_keys(view: &ViewConstants, sequence: impl Fn(usize) -> u32, scratch: &mu
                 *key = ordered_bits((x * x + y * y + z * z).sqrt() as f32);
             }
         }
-        // Pixels sort later, and take the order of the draw for equal depths.
+        // Per-pixel sorting happens later, and uses the order of the draw for equal depths.
         GaussianOrder::Primitive | GaussianOrder::PerPixel => *keys = *sequences,
     }
 }
 
-/// What a kept lane is sorted by at a pixel.
+/// The inputs for a kept lane's depth along a pixel's ray.
 fn ray_depth(view: &ViewConstants, at: usize, scratch: &Scratch) -> RayDepth {
     let [w, x, y, z] = &*scratch.rotation;
     let [sx, sy, sz] = &*scratch.scale;
@@ -488,7 +490,7 @@ fn ray_depth(view: &ViewConstants, at: usize, scratch: &Scratch) -> RayDepth {
     )
 }
 
-/// Finds the tiles and the colour of the kept Gaussians and appends what reaches a tile to `out`.
+/// Finds the tiles and colours of the kept Gaussians and appends those that reach a tile to `out`.
 #[inline(always)]
 pub(super) fn emit<S: Simd>(
     view: &ViewConstants,
@@ -526,7 +528,7 @@ pub(super) fn emit<S: Simd>(
         bases.find(simd, degree, &directions);
         let needed = 3 * coefficient_count(degree) + 1;
         let is_whole = floats + 1 >= needed;
-        // All colours come first: what they wait for memory overlaps then.
+        // All colours are computed first, so that their reads from memory overlap.
         let mut colored = Colored::default();
         for (number, &at) in group.iter().enumerate() {
             let lane = scratch.lanes[at % GROUP];
@@ -570,7 +572,7 @@ fn append(
     scratch: &Scratch,
     out: &mut ProjectedGroup,
 ) {
-    // Iterators that know their lengths write without a look at the room that there is.
+    // Iterators of known length append without checking the capacity each time.
     let [keys, sequences] = &*scratch.keys;
     let keys = lanes.iter().map(|one| [keys[one.at], sequences[one.at]]);
     out.keys.extend(keys);
@@ -609,12 +611,12 @@ fn append(
 #[derive(Clone, Copy, Debug, Default)]
 struct ColoredLane {
     at: usize,
-    /// The fourth number is not one of the colour's.
+    /// Red, green and blue; the fourth number is unused.
     color: [f32; 4],
 }
 
 impl ColoredLane {
-    /// What the tile engine needs of it.
+    /// The splat that the tile engine reads.
     #[inline(always)]
     fn splat(&self, view: &ViewConstants, scratch: &Scratch) -> Splat {
         let [red, green, blue, _] = self.color;
@@ -623,7 +625,7 @@ impl ColoredLane {
     }
 }
 
-/// Those of some directions.
+/// The coloured lanes of a batch of directions.
 #[derive(Default)]
 struct Colored {
     lanes: [ColoredLane; DIRECTIONS],
@@ -646,7 +648,7 @@ impl Colored {
     }
 }
 
-/// Which lanes are finite, which have a rotation, and which have no negative scale.
+/// The lanes whose attributes are finite, those with a nonzero rotation, and those without a negative scale.
 #[inline(always)]
 fn find_sound<S: Simd>(simd: S, attributes: &Attributes, len: usize) -> [Bits; 3] {
     let mut sound = [Bits::default(); 3];
@@ -654,7 +656,7 @@ fn find_sound<S: Simd>(simd: S, attributes: &Attributes, len: usize) -> [Bits; 3
     for at in (0..len).step_by(S::f32s::LEN) {
         let load =
             |lanes: &[f32; F32_LANES]| S::f32s::from_slice(simd, &lanes[at..at + S::f32s::LEN]);
-        // Multiplied by zero, what is not finite becomes NaN, and stays it.
+        // Times zero, a number that is not finite becomes NaN, and sums stay NaN.
         let mut nothing = load(&attributes.opacity) * zero;
         let mut least = zero;
         for lanes in &attributes.scale {
@@ -682,10 +684,10 @@ fn find_sound<S: Simd>(simd: S, attributes: &Attributes, len: usize) -> [Bits; 3
 pub(super) struct GroupTask<'a> {
     pub(super) append: &'a GaussianAppend,
     pub(super) instance: u32,
-    /// Which Gaussian of the set the instance's first is.
+    /// The number in the set of the instance's first Gaussian.
     pub(super) sequence: u32,
     pub(super) part: GroupSource<'a>,
-    /// Whether the cluster holds its spherical harmonics.
+    /// True if the cluster holds the append's spherical harmonics.
     pub(super) has_harmonics: bool,
     pub(super) frustum: Arc<Frustum>,
 }
@@ -698,7 +700,7 @@ pub(super) enum GroupSource<'a> {
 }
 
 impl<'a> GroupTask<'a> {
-    /// Reads the group, if it lies in no cluster, and what its model does to it.
+    /// Reads the group, unless its cluster holds the attributes, and the model's attributes.
     pub(super) fn read<'b>(
         &'b self,
         fetcher: &mut Fetcher,
@@ -731,7 +733,7 @@ impl<'a> GroupTask<'a> {
             GroupSource::Cluster(cluster) => {
                 attributes.clone_from(&cluster.attributes);
                 fetcher.fade(streams, &group, attributes);
-                // Products need not be finite.
+                // Products of finite numbers may overflow.
                 (&*attributes, false)
             }
             GroupSource::From(_) => {
@@ -755,7 +757,7 @@ impl<'a> GroupTask<'a> {
     }
 }
 
-/// What projects tasks.
+/// Projects groups of Gaussians for one view.
 pub(super) struct Preprocessor<'a> {
     pub(super) runtime: &'a Runtime,
     pub(super) constants: &'a ViewConstants,
@@ -763,10 +765,10 @@ pub(super) struct Preprocessor<'a> {
 }
 
 impl Preprocessor<'_> {
-    /// Does all tasks.
+    /// Projects all groups, and keeps their order.
     pub(super) fn run(&self, tasks: &[GroupTask<'_>]) -> Vec<ProjectedGroup> {
-        // Each thread makes its scratch once. Nobody else asks for its lock, and no task waits for others, so that none is
-        // begun within another.
+        // Each thread allocates its scratch once. No other thread takes its lock, and no task waits for others, so that
+        // no task begins within another on the same thread.
         let workers = (0..rayon::current_num_threads()).map(|_| Mutex::new(None));
         let workers: Vec<Mutex<Option<Worker>>> = workers.collect();
         let one = |task| {
@@ -783,7 +785,7 @@ impl Preprocessor<'_> {
         groups
     }
 
-    /// Does a task.
+    /// Projects one group.
     fn task(&self, worker: &mut Worker, task: &GroupTask<'_>) -> ProjectedGroup {
         let Worker {
             fetcher,
@@ -794,7 +796,7 @@ impl Preprocessor<'_> {
         let mut out = ProjectedGroup::default();
         let constants = self.constants;
         let source = task.read(fetcher, attributes, matrices, self.is_flat);
-        // A frustum is for opacities that it was told of.
+        // The task's frustum is for opacities of at most 1, or of at most the clusters' opacity.
         let wider;
         let mut frustum = &*task.frustum;
         if let GroupSource::From(_) = task.part {
@@ -811,7 +813,7 @@ impl Preprocessor<'_> {
             .has(Optimization::Bounds)
             .then_some(frustum);
         if let Some(matrices) = source.matrices {
-            // What is yet to be placed in the world by the same matrix sees the planes where they are for it.
+            // With one matrix for all lanes, the frustum is transformed to the space before it.
             let uniform = bounds.and(matrices.uniform());
             placed = uniform.and_then(|matrix| frustum.within(matrix));
             bounds = placed.as_ref();
@@ -829,11 +831,11 @@ impl Preprocessor<'_> {
     }
 }
 
-/// What a worker keeps from one group to the next.
+/// The buffers that a worker reuses from one group to the next.
 struct Worker {
     fetcher: Fetcher,
     attributes: Box<Attributes>,
-    /// Made when they are needed.
+    /// Allocated when first needed.
     matrices: Option<Box<Matrices>>,
     scratch: Scratch,
 }

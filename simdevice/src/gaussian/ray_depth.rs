@@ -1,33 +1,34 @@
-//! Depth along a pixel's ray: what Gaussians are sorted by, pixel by pixel, in the per-pixel order.
+//! Depth along a pixel's ray, by which the per-pixel order sorts Gaussians at each pixel.
 //!
-//! A pixel's ray starts at `e + R^T o` and runs along `R^T r`, with `o` and `r` in camera axes. A Gaussian is greatest on
-//! it at `tau = (a . b) / (a . a)`, where `a = B r`, `b = B (R (p - e) - o)`, and B takes camera axes to the Gaussian's own
-//! axes, divided by its standard deviations: `tau` minimises `|b - tau a|`. Standard deviations below 2^-10 of the greatest
-//! are raised to that, so that `a` is never zero and `tau` is never lost to rounding. Everything is binary64 without fused
-//! operations, and the same bits at every SIMD level.
+//! A pixel's ray starts at `e + R^T o` and runs along `R^T r`, with `o` and `r` in camera axes. A Gaussian is greatest
+//! on it at `tau = (a . b) / (a . a)`, where `a = B r`, `b = B (R (p - e) - o)`, and B takes camera axes to the
+//! Gaussian's own axes, divided by its standard deviations: `tau` minimises `|b - tau a|`. Standard deviations below
+//! 2^-10 of the greatest are raised to that, so that `a` is never zero and rounding leaves digits of `tau`. Everything
+//! is binary64 without fused operations, so that all SIMD levels give the same bits.
 
 use crate::state::Viewport;
 use crate::state::gaussian::{Camera, CameraModel};
 use fearless_simd::{Simd, f64x8, prelude::*};
 
-/// The least standard deviation, as a share of the Gaussian's greatest.
+/// The least standard deviation, relative to the Gaussian's greatest.
 const LEAST_RATIO: f64 = 1.0 / 1024.0;
 
-/// The low bits of a depth that rounding clears: 36 of the significand's 52 remain.
+/// The number of low bits of a depth that rounding clears: 36 of the significand's 52 remain.
 const ROUNDED_BITS: u32 = 16;
 
-/// What a Gaussian's depth along a ray comes from.
+/// The coefficients of a Gaussian's depth along a ray.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct RayDepth {
-    /// B, by column.
+    /// The matrix B, by column.
     columns: [[f64; 3]; 3],
-    /// `b` for a ray from the eye.
+    /// The vector `b` for a ray from the eye.
     centre: [f64; 3],
 }
 
 impl RayDepth {
-    /// Of a Gaussian with standard deviations `scale` along axes turned by the quaternion `rotation` (w, x, y, z, any
-    /// length but zero), whose centre is `offset` from the eye, in world axes. `camera` is the camera's rotation.
+    /// The coefficients of a Gaussian with standard deviations `scale` along axes rotated by the quaternion `rotation`
+    /// (w, x, y, z, any length but zero), whose centre is `offset` from the eye, in world axes. `camera` is the
+    /// camera's rotation.
     pub(crate) fn new(
         camera: &[f64; 9],
         rotation: [f64; 4],
@@ -38,7 +39,7 @@ impl RayDepth {
         let axes = axes(rotation);
         let mut depth = Self::default();
         for row in 0..3 {
-            // A point is as deep as a ball.
+            // A point has the depth of a ball.
             let stretch = if greatest > 0.0 {
                 (greatest / scale[row]).min(1.0 / LEAST_RATIO)
             } else {
@@ -53,7 +54,7 @@ impl RayDepth {
         depth
     }
 
-    /// The depth along eight of `rays`, from the `first` on.
+    /// The depths along eight of `rays`, from number `first` on.
     #[inline(always)]
     pub(crate) fn along<S: Simd>(&self, simd: S, rays: &Rays, first: usize) -> f64x8<S> {
         let number = |value: f64| f64x8::splat(simd, value);
@@ -79,15 +80,15 @@ impl RayDepth {
     }
 }
 
-/// What a draw in the per-pixel order has besides its splats.
+/// The inputs of the per-pixel order, in addition to a draw's splats.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RayDepths<'a> {
-    /// By group, as the splats.
+    /// The Gaussians by group, in the order of the splats.
     pub(crate) of: &'a [Vec<RayDepth>],
     pub(crate) rays: PixelRays,
 }
 
-/// A quaternion's axes in the world: the columns of its matrix.
+/// The axes of a quaternion's rotation in the world: the columns of its matrix.
 pub(super) fn axes(rotation: [f64; 4]) -> [[f64; 3]; 3] {
     let largest = rotation.iter().fold(0.0f64, |a, c| a.max(c.abs()));
     let scaled = rotation.map(|c| c / largest);
@@ -120,10 +121,10 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// A number that orders as a depth does, once that is rounded to 36 bits of its significand: depths that are equal but
-/// for rounding are then equal.
+/// An integer that orders as a depth does after rounding to 36 bits of its significand, so that depths that differ only
+/// by rounding errors are equal.
 pub(crate) fn ordered_key(depth: f64) -> u64 {
-    // A carry into the exponent is right. Negative zero becomes zero.
+    // A carry into the exponent gives the correct next number. Negative zero becomes zero.
     let bits = (depth + 0.0)
         .to_bits()
         .wrapping_add(1 << (ROUNDED_BITS - 1));
@@ -135,19 +136,19 @@ pub(crate) fn ordered_key(depth: f64) -> u64 {
     }
 }
 
-/// Rays that are taken together: those of a block of pixels.
+/// The number of rays that are evaluated together: those of a block of 4x4 pixels.
 pub(crate) const RAYS: usize = 16;
 
 /// Rays in camera axes.
 #[derive(Clone, Debug)]
 pub(crate) struct Rays {
     direction: [[f64; RAYS]; 3],
-    /// Where they begin, if they are parallel; else in the eye.
+    /// The starting points in x and y, if the rays are parallel; otherwise all start at the eye.
     origin: [[f64; RAYS]; 2],
     parallel: bool,
 }
 
-/// How pixels become rays.
+/// The map from pixels to rays.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PixelRays {
     model: CameraModel,
@@ -169,7 +170,7 @@ impl PixelRays {
         }
     }
 
-    /// The rays of points of the framebuffer.
+    /// The rays of these points of the framebuffer.
     pub(crate) fn of(&self, x: [f64; RAYS], y: [f64; RAYS]) -> Rays {
         let mut rays = Rays {
             direction: [[0.0; RAYS]; 3],
@@ -184,7 +185,7 @@ impl PixelRays {
                 CameraModel::Orthographic => [0.0, 0.0, 1.0],
                 CameraModel::Fisheye => {
                     let angle = (u * u + v * v).sqrt();
-                    // On the axis the limit.
+                    // The limit on the axis.
                     let across = if angle == 0.0 {
                         1.0
                     } else {
@@ -249,7 +250,7 @@ mod tests {
                     prop_assert_eq!(other, &found[0], "levels differ");
                 }
                 let t = found[0][3];
-                // The squared distance from the centre in standard deviations, at a place on the ray.
+                // The squared distance from the centre in standard deviations, at a point of the ray.
                 let distance = |t: f64| {
                     let parallel = model == CameraModel::Orthographic;
                     let from = |axis: usize| if parallel { rays.origin[axis][0] } else { 0.0 };
@@ -272,16 +273,16 @@ mod tests {
     fn flat_ones_meet_the_ray_and_points_are_balls() {
         let upright = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
         let rays = pixel_rays(CameraModel::Pinhole).of([150.0; RAYS], [40.0; RAYS]);
-        // A wall at z = 4, seen at 45 degrees from its middle: as thick as a thousandth of its width.
+        // A wall at z = 4 whose thickness is raised to a thousandth of its width, seen at 45 degrees from its middle.
         let identity = [1.0, 0.0, 0.0, 0.0];
         let wall = RayDepth::new(&upright, identity, [2.0, 2.0, 0.0], [0.0, 0.0, 4.0]);
         let depth = along(&wall, &rays, 0)[0][0];
         assert!((depth - 4.0).abs() < 1e-5, "{depth}");
-        // The foot of the perpendicular.
+        // The depth is that of the perpendicular's foot.
         let point = RayDepth::new(&upright, identity, [0.0; 3], [0.0, 0.0, 4.0]);
         let depth = along(&point, &rays, 0)[0][0];
         assert!((depth - 2.0).abs() < 1e-12, "{depth}");
-        // A needle along the ray is as deep as its middle.
+        // A needle parallel to the ray has the depth of its middle.
         let needle = RayDepth::new(&upright, identity, [0.0, 0.0, 3.0], [4.0, 0.0, 4.0]);
         let depth = along(&needle, &rays, 0)[0][0];
         assert!((depth - 4.0).abs() < 1e-5, "{depth}");

@@ -1,4 +1,4 @@
-//! The account of a Gaussian draw before its tiles are rendered.
+//! The record of a Gaussian draw's work before its tiles are rendered.
 
 use crate::gaussian::splat::Splat;
 use crate::limits::TILE_SIZE;
@@ -9,19 +9,20 @@ use timing::stages;
 use timing::stages::GaussianCounts;
 use timing::work::{DrawWork, Mode, TILE_SIDES};
 
-/// The Gaussians of a set, by who projected them: what that counted, and what is drawn of it.
+/// The Gaussians of a set that either the device or vertex programs projected: their counters, and the splats that are
+/// drawn.
 pub(crate) struct Projected<'a> {
     pub(crate) counters: &'a Counters,
     pub(crate) splats: &'a [Vec<Splat>],
 }
 
 impl Projected<'_> {
-    /// Those that the draw named.
+    /// The number of Gaussians that were read.
     fn read(&self) -> u64 {
         self.counters.get(Counter::GaussiansRead)
     }
 
-    /// Those beyond the near plane and not faint.
+    /// The number of Gaussians that are finite, bright enough and between the near and far planes.
     fn kept(&self) -> u64 {
         let early = [
             Counter::SkippedNonFinite,
@@ -41,8 +42,9 @@ impl Projected<'_> {
     }
 }
 
-/// What is known of a Gaussian draw before its tiles are rendered: of what the device projected, and of what vertex programs
-/// did, which moved `program_bytes` besides what their instructions do.
+/// The work of a Gaussian draw before its tiles are rendered. `fixed` has the Gaussians that the device projected, and
+/// `by_program` those of vertex programs, which moved `program_bytes` in addition to the accesses of their
+/// instructions.
 pub(crate) fn gaussian_draw(
     fixed: &Projected<'_>,
     by_program: &Projected<'_>,
@@ -84,7 +86,7 @@ pub(crate) fn gaussian_draw(
 /// The binary logarithm of 1 / 255.
 const LOG2_FLOOR: f64 = -7.994_353_436_858_858;
 
-/// Tiles of each size that the bounding box of a Gaussian's ellipse touches, out to an alpha of 1 / 255.
+/// The number of tiles of each size that the bounding box of a Gaussian's ellipse touches, out to an alpha of 1 / 255.
 fn sized_boxes(splat: &Splat, bounds: Rect) -> [u64; TILE_SIDES.len()] {
     let [xx, _, yy] = covariance(splat);
     let octaves = f64::from(splat.log2_opacity) - LOG2_FLOOR;
@@ -94,16 +96,16 @@ fn sized_boxes(splat: &Splat, bounds: Rect) -> [u64; TILE_SIDES.len()] {
     sized_tiles([x - dx, y - dy], [x + dx, y + dy], bounds)
 }
 
-/// The covariance of x and x, x and y, y and y in px^2.
+/// The covariance of a splat in px^2: xx, xy, yy.
 fn covariance(splat: &Splat) -> [f64; 3] {
     let [a, b, c] = splat.factor;
-    // It is the inverse of 2 ln 2 times the factor's square.
+    // The conic is 2 ln 2 times the factor's square, and the covariance is its inverse.
     let scale = 1.0 / (2.0 * std::f64::consts::LN_2 * a * a * c * c);
     [c * c * scale, -b * c * scale, (a * a + b * b) * scale]
 }
 
-/// Tiles of `bounds` under the square around the circle of three standard deviations, rounded up to pixels: what the
-/// original 3DGS code bins.
+/// The number of tiles of `bounds` that the square around the circle of three standard deviations touches, rounded up
+/// to pixels: the tiles to which the original 3DGS code bins.
 fn boxed_tiles(splat: &Splat, bounds: Rect) -> u64 {
     let [xx, xy, yy] = covariance(splat);
     let middle = 0.5 * (xx + yy);
@@ -147,7 +149,7 @@ mod tests {
     fn boxes_are_of_three_standard_deviations() {
         assert_eq!(boxed_tiles(&splat([40.0, 40.0], 1.0), BOUNDS), 1);
         assert_eq!(boxed_tiles(&splat([33.0, 40.0], 1.0), BOUNDS), 2);
-        // A radius of 30 pixels or so about (80, 40) is 5 by 5 tiles, of which there are 5 rows.
+        // A radius of about 30 pixels gives 5 by 5 tiles, and there are 5 rows of tiles.
         assert_eq!(boxed_tiles(&splat([88.0, 40.0], 10.0), BOUNDS), 25);
         assert_eq!(boxed_tiles(&splat([-500.0, 40.0], 10.0), BOUNDS), 0);
         assert_eq!(boxed_tiles(&splat([80.0, 40.0], 1000.0), BOUNDS), 50);

@@ -1,9 +1,9 @@
-//! Sets that are drawn again as they were: where neither what was read nor the view has changed since, they are still
-//! projected, sorted and binned.
+//! The reuse of sorted sets: if neither the attributes nor the view have changed since a set was last drawn, its
+//! projection, sort and tile lists are used again.
 //!
-//! A set lives in the memory of the positions that it was made from, like clusters: it is gone when that is freed or
-//! written. A buffer has one for each view, that of its last picture, which goes before another is made, so that there are
-//! never two.
+//! A set belongs to the memory of the positions that it was made from, like clusters, and is dropped when that is freed
+//! or written. A buffer has at most one set for each view, that of its last picture. It is freed before another is
+//! made, so that there are never two at once.
 
 use super::attributes::{SourceFingerprint, is_device_local};
 use super::clusters::Clusters;
@@ -18,23 +18,23 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 /// Everything that a sorted set depends on.
 #[derive(Debug)]
 pub(super) struct Key {
-    /// Those of all attributes of all draws, positions of the first one first.
+    /// The fingerprints of all attributes of all appends, beginning with the positions of the first.
     streams: Vec<SourceFingerprint>,
-    /// First vertex, vertices, first instance, instances of each draw.
+    /// First vertex, vertex count, first instance and instance count of each append.
     ranges: Vec<[u32; 4]>,
-    /// What is applied to the attributes of each.
+    /// The activations of each append's attributes.
     activations: Vec<Activations>,
-    /// The clusters of each, which its accounts depend on.
+    /// The clusters of each append, on which the counters depend.
     clusters: Vec<Weak<Clusters>>,
     state: Arc<GaussianState>,
     camera: Camera,
     viewport: Viewport,
     bounds: Rect,
-    /// The view, of which each has a set of its own.
+    /// The view. Each has a set of its own.
     layer: u32,
     /// The depth attachment's format, if centres have depths.
     depth: Option<Format>,
-    /// Whether a fragment program makes the colours, which what is hidden depends on.
+    /// True if a fragment program computes colours. Then nothing is hidden by others.
     is_resolved: bool,
 }
 
@@ -45,12 +45,12 @@ struct Entry {
     bytes: u64,
 }
 
-/// The last sets of a device's buffers, the oldest first.
+/// The last sets of a device's buffers, from the oldest to the newest.
 #[derive(Debug, Default)]
 pub(crate) struct ReuseCache(Mutex<Vec<Entry>>);
 
 impl Key {
-    /// What `set` depends on; `None` if something of it may change unseen.
+    /// The key of `set`; `None` if the driver does not see all writes to its inputs.
     pub(super) fn new(set: &GaussianSet, clusters: &[Option<Arc<Clusters>>]) -> Option<Self> {
         let seen = |append: &GaussianAppend| {
             append.indices.is_none() && attributes(append).all(is_device_local)
@@ -107,14 +107,14 @@ impl Key {
             && self.has_same_batches(other)
     }
 
-    /// Whether the same places in the set are in the same groups of both.
+    /// True if both have the same appends with the same clusters.
     fn has_same_batches(&self, other: &Self) -> bool {
         let mut clusters = self.clusters.iter().zip(&other.clusters);
         let same = self.ranges == other.ranges && self.activations == other.activations;
         same && clusters.all(|(a, b)| a.ptr_eq(b))
     }
 
-    /// Whether both draw the same buffer first, for the same view.
+    /// True if the first appends of both read positions from the same buffer, for the same view.
     fn is_of_same_buffer(&self, other: &Self) -> bool {
         let mut first = self.streams.iter().zip(&other.streams).take(1);
         self.layer == other.layer && first.all(|(a, b)| a.is_same_buffer(b))
@@ -138,11 +138,11 @@ impl Entry {
 
 impl ReuseCache {
     fn lock(&self) -> MutexGuard<'_, Vec<Entry>> {
-        // What a panic left behind is only forgotten sooner.
+        // A panic while the lock was held can only leave entries that are dropped too early.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The set that was made from what has this key. If there is none, what the same buffer last made is freed.
+    /// The set with this key. If there is none, the last set of the same buffer is freed.
     pub(super) fn find(&self, key: &Key) -> Option<Arc<SortedSet>> {
         let mut entries = self.lock();
         let is_old = |entry: &mut Entry| {
@@ -156,7 +156,7 @@ impl ReuseCache {
         found.and_then(|found| found.set.upgrade())
     }
 
-    /// Keeps a set of `bytes`, in place of older ones where all together would take more than `budget`.
+    /// Stores a set that takes `bytes`. The oldest sets are freed while all together would exceed `budget`.
     pub(super) fn keep(&self, key: Key, set: &Arc<SortedSet>, bytes: u64, budget: u64) {
         if bytes > budget {
             return;
@@ -183,7 +183,7 @@ impl ReuseCache {
     }
 }
 
-/// Everything that is read from memory, positions first.
+/// All attributes that an append reads from memory, positions first.
 fn attributes(append: &GaussianAppend) -> impl Iterator<Item = &AttributeStream> {
     let attributes = &append.attributes;
     let model = &attributes.model;

@@ -1,14 +1,14 @@
-//! What a worker needs to project a group of Gaussians.
+//! The buffers that a worker needs to project a group of Gaussians.
 
 use super::attributes::Attributes;
 use super::footprint::TileFootprint;
 use super::instances::{Matrices, Placed};
 use super::lanes::{Bits, F32_LANES, GROUP, GroupF64, NO_GROUP_F64};
 
-/// Where at most one lane of so many is not kept, it is not left out.
+/// The greatest share of culled lanes at which all lanes are processed is `1 / MOST`.
 const MOST: usize = 4;
 
-/// The reach of each lane, as the two words of [`TileFootprint::words`].
+/// The tile footprint of each lane, as the two words of [`TileFootprint::words`].
 pub(super) struct TileFootprints(pub(super) [[u64; GROUP + 8]; 2]);
 
 impl Default for TileFootprints {
@@ -18,7 +18,7 @@ impl Default for TileFootprints {
 }
 
 impl TileFootprints {
-    /// A lane's.
+    /// The footprint of a lane.
     #[inline(always)]
     pub(super) fn get(&self, at: usize) -> TileFootprint {
         TileFootprint::from_words([self.0[0][at], self.0[1][at]])
@@ -31,11 +31,11 @@ impl TileFootprints {
     }
 }
 
-/// What becomes of a group's Gaussians: of those that were kept, densely, in structures of arrays.
+/// The intermediate results of a group's kept Gaussians, densely packed, as structures of arrays.
 pub(crate) struct Scratch {
-    /// The lanes that were read, in the order of all that follows.
+    /// The lanes of the group that the arrays below hold, in their order.
     pub(super) lanes: Vec<usize>,
-    /// Which of them were kept: all, but where most were, and to leave the others out would take longer.
+    /// The elements that were kept: all, unless so few lanes were culled that packing the others would take longer.
     pub(super) kept: Bits,
     pub(super) position: Box<[GroupF64; 3]>,
     pub(super) scale: Box<[GroupF64; 3]>,
@@ -47,33 +47,33 @@ pub(crate) struct Scratch {
     pub(super) camera: Box<[GroupF64; 3]>,
     /// The depth variable.
     pub(super) depth: Box<GroupF64>,
-    /// What model matrices make of them, if there are any.
+    /// The model matrices and the directions in model space, if there are any.
     pub(super) placed: Option<Box<Placed>>,
-    /// The Jacobian's rows in the axes of the Gaussians' space, unless a pinhole sees the world itself.
+    /// The Jacobian's rows in the axes of the Gaussians' space. Unused for a pinhole without models.
     pub(super) jacobian: Box<[[GroupF64; 3]; 2]>,
-    /// Of covariances in the picture: xx, xy, yy and the determinant, where the unscented transform finds them.
+    /// The covariances in the picture from the unscented transform: xx, xy, yy and the determinant.
     pub(super) moments: Box<[GroupF64; 4]>,
     pub(super) flat: Box<ScreenGaussians>,
-    /// Which of them reach tiles.
+    /// The elements that reach tiles.
     pub(super) reached: Vec<usize>,
-    /// Which tiles, of those that do.
+    /// The footprints of those that reach tiles.
     pub(super) reaches: Box<TileFootprints>,
-    /// The same of their copies a period beside, in the same order: which side's, 0 or 1, in the middle.
+    /// The footprints of their copies a period away: element, side (0 or 1), footprint. Elements ascend.
     pub(super) copies: Vec<(usize, usize, TileFootprint)>,
-    /// What each is sorted by, and its place in the set.
+    /// The sort key of each element, and its number in the set.
     pub(super) keys: Box<[[u32; GROUP]; 2]>,
 }
 
-/// Gaussians on the screen.
+/// Gaussians in the picture: the output of projection.
 pub(super) struct ScreenGaussians {
     pub(super) mean: [GroupF64; 2],
     pub(super) determinant: GroupF64,
     pub(super) log2_opacity: GroupF64,
-    /// Those whose exponents are formed in binary64.
+    /// The elements whose exponents must be computed in binary64.
     pub(super) steep: Bits,
-    /// See [`Splat::factor`](super::project::Splat::factor).
+    /// The factors of the exponent: see [`Splat::factor`](super::splat::Splat::factor).
     pub(super) factor: [GroupF64; 3],
-    /// See [`Ellipse`](super::footprint::Ellipse).
+    /// The half size of the ellipse's box: see [`Ellipse`](super::footprint::Ellipse).
     pub(super) half: [GroupF64; 2],
     pub(super) slope: GroupF64,
     pub(super) narrowing: GroupF64,
@@ -123,8 +123,8 @@ impl Scratch {
         }
     }
 
-    /// Packs the kept lanes of `len` densely, as binary64; if `may_have_others` and there are few others, all lanes stay where
-    /// they are.
+    /// Packs the kept lanes of `len` densely, as binary64. If `may_have_others` and few lanes were culled, all lanes
+    /// are copied in place instead.
     #[inline(always)]
     pub(super) fn gather(
         &mut self,

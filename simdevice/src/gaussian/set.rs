@@ -9,34 +9,34 @@ use crate::state::{Rect, Viewport};
 use devmem::host;
 use isa::machine::Stopped;
 
-/// The most groups of a set: a survivor is named by its group and its place there, in 32 bits.
+/// The most groups of a set: a splat's index, which is its group and its place there, has 32 bits.
 pub(super) const MAX_GROUPS: u64 = (1 << 32) / GROUP as u64;
 
 /// A set of Gaussians that are sorted and drawn together.
 #[derive(Debug)]
 pub struct GaussianSet {
     pub(super) begin: GaussianBegin,
-    /// The layer that it is drawn to, which is its view.
+    /// The layer to which the set is drawn. It selects the view.
     pub(super) layer: u32,
     pub(super) bounds: Rect,
     pub(super) depth: Option<CenterDepth>,
-    /// What depths are rounded to.
+    /// The format to which depths are rounded.
     pub(super) depth_format: Format,
     pub(super) resolve: Option<GaussianFragmentStage>,
     pub(super) appends: Vec<GaussianAppend>,
-    /// Those that a vertex program projects, which come after the others.
+    /// The draws that a vertex program projects. They come after the appends.
     pub(super) draws: Vec<Draw>,
 }
 
-/// A set cannot be drawn.
+/// The reasons why a set cannot be drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SortError {
-    /// It has more Gaussians than one draw can sort.
+    /// The set has more Gaussians than one draw can sort.
     #[error(
         "a sorted set of {groups} groups of Gaussians exceeds the {MAX_GROUPS} that a draw can hold"
     )]
     TooManyGaussians {
-        /// How many groups it would take.
+        /// The number of groups that it would take.
         groups: u64,
     },
     /// A vertex program ran for too long.
@@ -85,7 +85,7 @@ impl GaussianSet {
         }
     }
 
-    /// Starts the set of view `layer`, which is number `number` of the pass's views.
+    /// Starts the set of view `layer`, with the camera of the pass's view number `number`.
     pub fn begin_view(
         begin: &GaussianBegin,
         (number, layer): (usize, u32),
@@ -105,14 +105,14 @@ impl GaussianSet {
         }
     }
 
-    /// Adds Gaussians.
+    /// Adds the Gaussians of a packet to the set.
     pub fn append(&mut self, append: &GaussianAppend) {
         if append.count > 0 && append.instance_count > 0 {
             host::push(&mut self.appends, append.clone());
         }
     }
 
-    /// Has a fragment program make the colours of the set's fragments.
+    /// Lets a fragment program compute the colours of the set's fragments.
     pub fn shade_fragments(&mut self, shader: &GaussianFragmentStage) {
         if shader.program.reads_depth() {
             let begin = &self.begin;
@@ -132,7 +132,7 @@ impl GaussianSet {
         }
     }
 
-    /// Whether it is of 2D Gaussians.
+    /// True for a set of 2D Gaussians.
     pub(super) fn is_flat(&self) -> bool {
         self.begin.state.geometry == GaussianGeometry::Surfel
     }

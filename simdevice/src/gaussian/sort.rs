@@ -1,13 +1,13 @@
-//! The depth sort: a stable radix sort on exactly the bits that differ. What is more than a cache holds is parted by ranges of
-//! keys first, each of which is sorted for itself; workers share both steps.
+//! The depth sort: a stable radix sort on only those bits that differ. Sequences that exceed a cache are first
+//! partitioned by ranges of keys, and each part is sorted for itself. Workers share both steps.
 
 use devmem::host;
 use rayon::prelude::*;
 
-/// A key and what goes with it.
+/// A key and its payload.
 type SortEntry = (u32, u32);
 
-/// Maps a binary32 number to an integer that orders alike (negative zero before zero).
+/// The integer that orders as a binary32 number does (negative zero before zero).
 pub(super) fn ordered_bits(value: f32) -> u32 {
     let bits = value.to_bits();
     if bits >> 31 == 0 {
@@ -17,7 +17,7 @@ pub(super) fn ordered_bits(value: f32) -> u32 {
     }
 }
 
-/// The number whose [`ordered_bits`] these are.
+/// The number whose [`ordered_bits`] are `bits`.
 pub(super) fn value_of(bits: u32) -> f32 {
     f32::from_bits(if bits >> 31 == 1 {
         bits & !(1 << 31)
@@ -26,26 +26,26 @@ pub(super) fn value_of(bits: u32) -> f32 {
     })
 }
 
-/// The most bits of a digit: a first-level cache holds a line for each of its values.
+/// The most bits of a digit: the first-level cache holds a line for each value of it.
 const MAX_DIGIT_BITS: u32 = 9;
 const DIGITS: usize = 1 << MAX_DIGIT_BITS;
 
-/// Pairs of a part, about: it stays in a cache, and its keys differ in few bits.
+/// The approximate number of pairs in a part: it stays in a cache, and its keys differ in few bits.
 const PART: usize = 1 << 11;
 
-/// From how many pairs on it pays to make parts.
+/// The least number of pairs for which partitioning pays.
 const MANY: usize = 1 << 14;
 
-/// The most parts: as many as their numbers have values.
+/// The most parts: a part's number has 8 bits.
 const MAX_PARTS: usize = 1 << 8;
 
-/// Keys that are looked at to tell how the others are distributed.
+/// The number of keys that are sampled to estimate their distribution.
 const SAMPLES: usize = 1 << 11;
 
-/// Intervals of keys of which each belongs to one part.
+/// The number of intervals of keys. Each belongs to one part.
 const INTERVALS: usize = 1 << 12;
 
-/// Groups of lists that a worker parts: more than one, since some workers are slower than others.
+/// The number of groups of lists per worker in partitioning: more than one, since some workers are slower than others.
 const GROUPS_PER_WORKER: usize = 4;
 
 /// Sorts `(key, payload)` pairs by ascending key; equal keys keep their order.
@@ -55,17 +55,17 @@ pub fn sort_by_key(pairs: &mut Vec<SortEntry>) {
     *pairs = sorted;
 }
 
-/// Where the keys of pairs differ.
+/// The bits in which the keys of some pairs differ.
 struct Digits {
     least: u32,
     /// The lowest bit that differs.
     first: u32,
-    /// How many there are from it on, in what keys have more than the least.
+    /// The number of bits from `first` to the highest bit of the largest difference from `least`.
     width: u32,
 }
 
 impl Digits {
-    /// `None` if all keys are the same.
+    /// The digits of these slices; `None` if all keys are the same.
     fn of(slices: &[&[SortEntry]]) -> Option<Self> {
         let (mut least, mut greatest, mut all, mut any) = (u32::MAX, 0, u32::MAX, 0);
         for slice in slices {
@@ -84,7 +84,7 @@ impl Digits {
     }
 }
 
-/// Sorts the pairs of all slices, one after the other, into `sorted`, which has as many; `other` is scratch.
+/// Sorts the pairs of all slices in turn into `sorted`, which has as many elements; `other` is scratch.
 fn sort_into(slices: &[&[SortEntry]], other: &mut Vec<SortEntry>, sorted: &mut [SortEntry]) {
     let Some(digits) = Digits::of(slices) else {
         let mut rest = sorted;
@@ -100,7 +100,7 @@ fn sort_into(slices: &[&[SortEntry]], other: &mut Vec<SortEntry>, sorted: &mut [
     if passes > 1 && other.len() < sorted.len() {
         host::resize(other, sorted.len(), (0, 0));
     }
-    // The last pass ends in `sorted`.
+    // The number of passes decides which buffer comes first, so that the last pass writes to `sorted`.
     let mut is_other = passes.is_multiple_of(2);
     let to = if is_other {
         &mut other[..]
@@ -119,8 +119,9 @@ fn sort_into(slices: &[&[SortEntry]], other: &mut Vec<SortEntry>, sorted: &mut [
     }
 }
 
-/// Sorts what lists hold: each item's first number is its key, and its payload is its place in its list plus `stride`
-/// times the list's number. Then calls `settle` with pieces between which no key is shared. `workers` share the work.
+/// Sorts the items of all lists. An item's first number is its key; its payload becomes its place in its list plus
+/// `stride` times the list's number. Then calls `settle` with each piece of the result; no two pieces share a key.
+/// `workers` share the work.
 pub fn sort_lists<L: AsRef<[[u32; 2]]> + Sync>(
     lists: &[L],
     stride: u32,
@@ -161,7 +162,7 @@ pub fn sort_lists<L: AsRef<[[u32; 2]]> + Sync>(
     pairs
 }
 
-/// Calls `each` with all keys and payloads, in order; the first list has number `first`.
+/// Calls `each` with all keys and payloads, in order. The first list has number `first`.
 #[inline(always)]
 fn for_pairs<L: AsRef<[[u32; 2]]>>(
     lists: &[L],
@@ -177,19 +178,19 @@ fn for_pairs<L: AsRef<[[u32; 2]]>>(
     }
 }
 
-/// Ranges of keys that have about as many pairs each, as far as a sample tells.
+/// Ranges of keys with about the same number of pairs each, as estimated from a sample.
 struct Parts {
     count: usize,
-    /// The part of each interval; parts ascend.
+    /// The part of each interval, in ascending order.
     of: [u8; INTERVALS],
-    /// Where intervals begin, and how wide they are: two to this power. What is below belongs to the first one, and what
-    /// is above to the last.
+    /// The key at which intervals begin. Lower keys belong to the first interval, and keys above all of them to the
+    /// last. An interval's width is two to the power of `shift`.
     least: u32,
     shift: u32,
 }
 
 impl Parts {
-    /// Of lists that are not all empty, with so many pairs together.
+    /// The parts of lists with `count` pairs in total, at least one.
     fn new<L: AsRef<[[u32; 2]]>>(lists: &[L], count: usize) -> Self {
         let items = lists.iter().flat_map(|list| list.as_ref());
         let some = items.step_by(count.div_ceil(SAMPLES));
@@ -230,15 +231,15 @@ impl Parts {
     }
 }
 
-/// The pairs of some lists by part, each in the lists' order.
+/// The pairs of some lists, grouped by part. Within a part they are in the lists' order.
 struct Partition {
     pairs: Vec<SortEntry>,
-    /// Where each part ends.
+    /// The index one past the last pair of each part.
     ends: Box<[u32; MAX_PARTS]>,
 }
 
 impl Partition {
-    /// Of lists of which the first has number `first`.
+    /// The partition of lists of which the first has number `first`.
     fn new<L: AsRef<[[u32; 2]]>>(parts: &Parts, lists: &[L], first: usize, stride: u32) -> Self {
         let mut ends = Box::new([0; MAX_PARTS]);
         for item in lists.iter().flat_map(|list| list.as_ref()) {
@@ -261,7 +262,7 @@ impl Partition {
     }
 }
 
-/// Makes counts the places where what was counted starts.
+/// Replaces counts by the index of the first element of each, as a prefix sum.
 fn start_after_each_other(counts: &mut [u32]) {
     let mut start = 0;
     for count in counts {
@@ -269,7 +270,7 @@ fn start_after_each_other(counts: &mut [u32]) {
     }
 }
 
-/// One counting-sort pass over the digit of so many bits at `shift`.
+/// One counting-sort pass over the digit of `bits` bits at `shift`.
 fn scatter(from: &[&[SortEntry]], to: &mut [SortEntry], digits: &Digits, shift: u32, bits: u32) {
     let (least, mask) = (digits.least, (1u32 << bits) - 1);
     let digit = |key: u32| (((key - least) >> shift) & mask) as usize % DIGITS;

@@ -1,4 +1,4 @@
-//! A sorted set: what preprocessing, sort and binning make of Gaussians, and what the tile engine draws.
+//! Sorted sets: the result of preprocessing, sorting and binning Gaussians, and the input of the tile engine.
 
 use super::camera::period;
 use super::depth::DepthTrend;
@@ -19,55 +19,55 @@ use devmem::host;
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// The least groups that a worker takes where little is done for each.
+/// The least number of groups per task, where little is done for each group.
 const LEAST_GROUPS: usize = 64;
 
-/// What projection, sort and binning make of a set. Rasterization changes nothing of it.
+/// A set after projection, sort and binning. Rasterization does not change it.
 #[derive(Debug)]
 pub(crate) struct SortedSet {
-    /// By group; [`locate`](super::splat::locate) finds a primitive's.
+    /// The splats by group; [`locate`](super::splat::locate) takes an index apart.
     pub(crate) splats: Vec<Vec<Splat>>,
     pub(crate) tiles: TileLists,
-    /// By group, as the splats, if they are 2D Gaussians.
+    /// The 2D Gaussians by group, in the order of the splats, if the set has them.
     pub(super) surfels: Option<Vec<Vec<Surfel>>>,
-    /// By group, as the splats, if each pixel sorts for itself.
+    /// The coefficients of depths along rays by group, in the order of the splats, if the order is per pixel.
     pub(super) ray_depths: Option<Vec<Vec<RayDepth>>>,
-    /// What became of the set's Gaussians.
+    /// The counts of the set's Gaussians by what became of them.
     pub(super) counters: Counters,
 }
 
-/// A set that is sorted, binned and immutable, as it is drawn.
+/// A set that is sorted, binned and immutable, with the state to draw it.
 #[derive(Debug)]
 pub struct BinnedDraw {
-    /// What the pipeline fixes.
+    /// The fixed state of the pipeline.
     pub state: Arc<GaussianState>,
     /// The pixels that it may touch.
     pub bounds: Rect,
     /// The layer that it is drawn to.
     pub(crate) layer: u32,
     pub(crate) sorted: Arc<SortedSet>,
-    /// What is left out in its tiles.
+    /// The optimizations that are enabled in its tiles.
     pub(crate) optimizations: Optimizations,
-    /// What makes the colours of its fragments.
+    /// The fragment program that computes colours, if there is one.
     pub(crate) resolve: Option<GaussianFragmentStage>,
-    /// How its depths are numbers.
+    /// The encoding of depths.
     pub(crate) depth_unit: DepthEncoding,
-    /// How the depths of a tile's list follow one another.
+    /// The trend of depths along a tile's list.
     pub(crate) depth_trend: DepthTrend,
-    /// Half the pixels after which the picture repeats, or infinity.
+    /// Half the number of pixels after which the picture repeats, or infinity.
     pub(crate) half_period: f64,
     /// The pixels' rays.
     rays: PixelRays,
-    /// Where the work of its tiles goes, if anybody wants to know.
+    /// The record to which the work of its tiles is added, if there is a recorder.
     pub(crate) record: Option<Arc<DrawRecord>>,
 }
 
 impl SortedSet {
-    /// What the tile engine needs of the groups of `set`, which `tiles` holds; nothing is counted yet.
+    /// The sorted set of the groups of `set`, whose lists are `tiles`. Its counters are zero.
     pub(super) fn new(set: &GaussianSet, groups: Vec<ProjectedGroup>, tiles: TileLists) -> Self {
         let mut splats = host::with_capacity(groups.len());
         let mut others = host::with_capacity(groups.len());
-        // What else there is of groups goes here; with many, that takes a while.
+        // The groups' other data are freed here. With many groups that takes time.
         groups
             .into_par_iter()
             .with_min_len(LEAST_GROUPS)
@@ -102,7 +102,7 @@ impl SortedSet {
 }
 
 impl BinnedDraw {
-    /// What is drawn of `set`, which became `sorted`.
+    /// The draw of `set`, which was sorted to `sorted`.
     pub(super) fn new(
         set: GaussianSet,
         sorted: Arc<SortedSet>,
@@ -112,7 +112,7 @@ impl BinnedDraw {
         let begin = set.begin;
         Self {
             depth_trend: match (set.depth, begin.state.order) {
-                // What a program sorts by need not follow its depths.
+                // The sort keys of a vertex program are independent of its depths.
                 (Some(depth), GaussianOrder::ViewDepth) if set.draws.is_empty() => depth.trend(),
                 _ => DepthTrend::None,
             },
@@ -134,12 +134,12 @@ impl BinnedDraw {
         self.sorted.memory_bytes()
     }
 
-    /// What the splats are, if they are 2D Gaussians.
+    /// The 2D Gaussians of the splats, if the set has them.
     pub(crate) fn surfels(&self) -> Option<&[Vec<Surfel>]> {
         self.sorted.surfels.as_deref()
     }
 
-    /// What pixels sort by, if each does so for itself.
+    /// The inputs of the per-pixel order, if that is the order.
     pub(crate) fn ray_depths(&self) -> Option<RayDepths<'_>> {
         let of = self.sorted.ray_depths.as_ref()?;
         Some(RayDepths {
@@ -148,7 +148,7 @@ impl BinnedDraw {
         })
     }
 
-    /// Whether it may touch a pixel of `rect`.
+    /// True if it may touch a pixel of `rect`.
     pub fn touches(&self, rect: Rect) -> bool {
         let shared = self.bounds.intersect(rect);
         !shared.is_empty() && self.sorted.tiles.any_in(shared)

@@ -2,10 +2,10 @@
 
 use fearless_simd::{Simd, f32x4, f32x16, prelude::*};
 
-/// The coefficients of all degrees up to 4.
+/// The number of coefficients of degrees 0 to 4.
 pub(super) const MAX_COEFFICIENTS: usize = 25;
 
-/// Three components of each, and what makes it whole vectors.
+/// Three floats for each of them, padded to whole vectors.
 pub(super) const COEFFICIENT_FLOATS: usize = 80;
 
 const C0: f32 = 0.282_094_79;
@@ -39,12 +39,12 @@ const C4: [f32; 9] = [
     0.625_835_7,
 ];
 
-/// How many coefficients degrees 0 to `degree` have.
+/// The number of coefficients of degrees 0 to `degree`.
 pub fn coefficient_count(degree: u32) -> usize {
     (degree as usize + 1).pow(2)
 }
 
-/// Directions whose basis functions are found together.
+/// The number of directions whose basis functions are evaluated together.
 pub(super) const DIRECTIONS: usize = 16;
 
 /// The basis functions of degrees 0 to 4 in some directions: by function, then by direction.
@@ -57,7 +57,8 @@ impl Default for Bases {
 }
 
 impl Bases {
-    /// Finds the functions of degrees 0 to `degree` (at most 4) in unit directions from the eye: their x, y and z.
+    /// Evaluates the functions of degrees 0 to `degree` (at most 4) in unit directions from the eye, given as arrays of
+    /// x, y and z.
     #[inline(always)]
     pub(super) fn find<S: Simd>(
         &mut self,
@@ -104,11 +105,11 @@ impl Bases {
         }
     }
 
-    /// The colour `max(0, 0.5 + SH)` in one of the directions, at most the greatest number; `None` if a coefficient of
-    /// degrees 0 to `degree` is not finite.
+    /// The colour `max(0, 0.5 + SH)` in one of the directions, clamped to the greatest finite number; `None` if a
+    /// coefficient of degrees 0 to `degree` is not finite.
     ///
-    /// `coefficients` holds red, green and blue of each coefficient in turn, and at least one number more; what follows
-    /// them is not used. The colour has a fourth number, which means nothing.
+    /// `coefficients` holds red, green and blue of each coefficient in turn, and at least one more number. Numbers
+    /// after the coefficients are ignored. The fourth number of the colour is undefined.
     #[inline(always)]
     pub(super) fn color<S: Simd>(
         &self,
@@ -125,15 +126,15 @@ impl Bases {
             3 => self.sum::<S, 16>(simd, at, coefficients),
             _ => self.sum::<S, MAX_COEFFICIENTS>(simd, at, coefficients),
         };
-        // What is not finite makes the sum so, whatever it is multiplied by; the sum may also be too large. The fourth
-        // number is not one of the colour's.
+        // Coefficients that are not finite make the sum so, whatever they are multiplied by. The sum may also overflow.
+        // The fourth lane is ignored.
         if (sum * 0.0).simd_eq(0.0).to_bitmask() & 7 != 7 {
             return self.wide_color(degree, at, coefficients);
         }
         Some(sum.max(0.0).to_array())
     }
 
-    /// The same where a sum is not finite: in binary64, where no sum of numbers overflows.
+    /// The colour where the binary32 sum is not finite. The sum is in binary64, which cannot overflow here.
     #[cold]
     fn wide_color(&self, degree: u32, direction: usize, coefficients: &[f32]) -> Option<[f32; 4]> {
         let count = coefficient_count(degree).min(MAX_COEFFICIENTS);
@@ -150,7 +151,7 @@ impl Bases {
         Some([red, green, blue, 0.0])
     }
 
-    /// 0.5 and the sum of `COUNT` coefficients times their functions.
+    /// The sum of 0.5 and `COUNT` coefficients times their functions.
     #[inline(always)]
     fn sum<S: Simd, const COUNT: usize>(
         &self,
@@ -159,7 +160,8 @@ impl Bases {
         coefficients: &[f32],
     ) -> f32x4<S> {
         let coefficients = &coefficients[..3 * COUNT + 1];
-        // Two sums halve the wait for one another; the largest terms, the constant one and 0.5, are added last.
+        // Two sums shorten the chain of dependent additions. The largest terms, the constant one and 0.5, are added
+        // last.
         let (mut even, mut odd) = (f32x4::splat(simd, 0.0), f32x4::splat(simd, 0.0));
         let mut k = 1;
         while k < COUNT {
@@ -172,8 +174,8 @@ impl Bases {
         self.term(simd, at, coefficients, 0, even + odd) + 0.5
     }
 
-    /// `sum` and coefficient `k` times its function. A vector holds the coefficient's three components and the next one's
-    /// first, which is not used.
+    /// The sum of `sum` and coefficient `k` times its function. A vector holds the coefficient's three components and
+    /// the first one of the next coefficient, which is ignored.
     #[inline(always)]
     fn term<S: Simd>(
         &self,
@@ -255,7 +257,7 @@ mod tests {
         ]);
         let [red, green, blue] = color(2, [0.0, 0.0, 1.0], &sh).unwrap();
         assert_eq!((red, blue), (MAX, 0.0));
-        // What overflows on the way does not matter.
+        // Intermediate overflow does not matter.
         let expected = f64::from(C1) + 2.0 * f64::from(C2[2]) - f64::from(C0);
         assert!(
             (f64::from(green) / f64::from(MAX) - expected).abs() < 1e-6,
@@ -265,7 +267,7 @@ mod tests {
 
     #[test]
     fn the_basis_is_orthonormal() {
-        // A midpoint rule over the sphere is exact enough to tell any wrong constant or sign of a square.
+        // A midpoint rule over the sphere is accurate enough to detect any wrong constant.
         let (rows, columns) = (200u32, 400u32);
         let mut products = vec![[0.0f64; MAX_COEFFICIENTS]; MAX_COEFFICIENTS];
         for row in 0..rows {

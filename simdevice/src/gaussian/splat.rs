@@ -1,4 +1,4 @@
-//! What projection makes of Gaussians: the rasterizer's nine numbers, and what goes with them.
+//! Splats: projected Gaussians as the rasterizer's nine numbers, and the data that belong to them.
 
 use super::footprint::{TileFootprint, TileSpan};
 use super::lanes::GROUP;
@@ -9,10 +9,10 @@ use crate::stats::counters::Counters;
 use devmem::host;
 use fearless_simd::{Simd, prelude::*};
 
-/// A projected Gaussian: what the tile engine needs of it, in one cache line.
+/// A projected Gaussian as the tile engine reads it, in one cache line.
 ///
 /// At offset `d` pixels from the mean, `log2(alpha) = log2_opacity - u^2 - v^2` with `u = factor[0] d.x` and
-/// `v = factor[1] d.x + factor[2] d.y`: the Cholesky factor of the conic, scaled so that base 2 needs no more.
+/// `v = factor[1] d.x + factor[2] d.y`. The factor is the Cholesky factor of the conic, scaled for base 2.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(align(64))]
 pub(crate) struct Splat {
@@ -20,21 +20,21 @@ pub(crate) struct Splat {
     pub mean: [f64; 2],
     /// The scaled Cholesky factor of the conic, in 1/px.
     pub factor: [f64; 3],
-    /// Base-2 logarithm of the opacity.
+    /// The base-2 logarithm of the opacity.
     pub log2_opacity: f32,
     /// Red, green, blue.
     pub color: [f32; 3],
-    /// The centre's depth as the depth attachment holds it, if the draw tests or writes depth.
+    /// The centre's depth in the encoding of the depth attachment, if the draw tests or writes depth.
     pub depth: u32,
-    /// Whether its exponent is a difference of numbers so large that binary32 would lose it.
+    /// True if its exponent is a difference of numbers so large that binary32 would lose its digits.
     pub needs_f64: bool,
-    /// Whether it is wider than the period of a panorama: it then counts within half a period of its mean only, where
-    /// its copies do not. Such a one is steep.
+    /// True if it is wider than the period of a panorama. It then counts only within half a period of its mean, and its
+    /// copies elsewhere. `needs_f64` is then also true.
     pub exceeds_period: bool,
 }
 
 impl Splat {
-    /// A lane's.
+    /// The splat of an element of `flat`.
     #[inline(always)]
     pub(super) fn new(flat: &ScreenGaussians, at: usize, color: [f32; 3], depth: u32) -> Self {
         Self {
@@ -49,34 +49,35 @@ impl Splat {
     }
 }
 
-/// The greatest logarithm of the opacity for which exponents are formed in binary32: what is lost of them grows with it.
+/// The greatest base-2 logarithm of the opacity for which exponents are computed in binary32. Their rounding error
+/// grows with it.
 const STEEP_LOG2_OPACITY: f64 = 4.0;
 
-/// The greatest factor, in 1/px, for which they are: from a block's middle a pixel is 1.5 times this away. A low-pass
-/// variance of 0.3 px^2 keeps all factors below 1.6.
+/// The greatest factor, in 1/px, for which exponents are computed in binary32. Pixels are up to 1.5 px from a block's
+/// middle. A low-pass variance of 0.3 px^2 keeps all factors below 1.6.
 const STEEP_FACTOR: f64 = 8.0;
 
-/// Which Gaussians' exponents must be formed in binary64. It depends on each Gaussian alone.
+/// The Gaussians whose exponents must be computed in binary64. The result depends on each Gaussian alone.
 #[inline(always)]
 pub(super) fn are_steep<S: Simd>(factor: [S::f64s; 3], log2_opacity: S::f64s) -> S::mask64s {
-    // The first and the last one are never negative. What is not a number is no greater.
+    // The first and the last factor are never negative. NaN compares as not greater.
     let [a, b, c] = factor;
     (a.simd_gt(STEEP_FACTOR) | b.abs().simd_gt(STEEP_FACTOR))
         | (c.simd_gt(STEEP_FACTOR) | log2_opacity.simd_gt(STEEP_LOG2_OPACITY))
 }
 
-/// The least factor, in 1/px, whose binary16 value is as exact as that of others.
+/// The least factor, in 1/px, whose binary16 value has full precision.
 pub(super) const LEAST_HALF_FACTOR: f64 = 1.0 / 16384.0;
 
-/// How far, in units of `u^2 + v^2`, what is rasterized in binary16 reaches where exact arithmetic reaches `room`.
+/// The greatest `u^2 + v^2` that binary16 rasterization may accept where exact arithmetic accepts `room`.
 ///
-/// With a unit roundoff of 2^-11, `u` and the two terms of `v` err by three units each, and `v` by one more. The terms of
-/// `v` are at most `|v| + 2 |factor[1] / factor[0]| |u|`, so that needles, where they cancel, err most. Sums, exponent,
-/// logarithm, power and floor add less than a quarter.
+/// With a unit roundoff of 2^-11, `u` and the two terms of `v` have an error of three units each, and `v` one more. The
+/// terms of `v` are at most `|v| + 2 |factor[1] / factor[0]| |u|`, so that thin Gaussians, where they cancel, have the
+/// largest error. Sums, exponent, logarithm, power and floor add less than a quarter.
 pub(crate) fn binary16_headroom(factor: [f64; 3], room: f64) -> f64 {
     const UNIT: f64 = 1.0 / 2048.0;
     let [a, b, c] = factor.map(f64::abs);
-    // What is not a number is bounded by nothing.
+    // NaN has no bound.
     if a.min(c) >= LEAST_HALF_FACTOR {
         let stretch = 1.0 + 8.0 * UNIT * (1.0 + b / a);
         (room + 0.25 + 0.02 * room.abs()) * stretch * stretch
@@ -85,30 +86,30 @@ pub(crate) fn binary16_headroom(factor: [f64; 3], room: f64) -> f64 {
     }
 }
 
-/// The group of a survivor's name, and its place there.
+/// The group and the place in the group of the splat with index `name`.
 #[inline(always)]
 pub(crate) fn locate(name: u32) -> (usize, usize) {
     (name as usize / GROUP, name as usize % GROUP)
 }
 
-/// What came of a group.
+/// The result of projecting a group.
 #[derive(Debug, Default)]
 pub(crate) struct ProjectedGroup {
-    /// What is drawn, in the order of the draw.
+    /// The splats, in the order of the draw.
     pub splats: Vec<Splat>,
-    /// The depth key of each, and its place in the set, which decides between equal keys.
+    /// The depth key of each, and its number in the set, which orders equal keys.
     pub keys: Vec<[u32; 2]>,
-    /// What each is sorted by at a pixel, in the per-pixel order.
+    /// The coefficients of each one's depth along a ray, in the per-pixel order.
     pub ray_depths: Vec<RayDepth>,
-    /// What each is on the screen, if they are 2D Gaussians.
+    /// The disc of each, for 2D Gaussians.
     pub surfels: Vec<Surfel>,
-    /// The tiles of each.
+    /// The tile footprint of each.
     pub reaches: Vec<TileFootprint>,
-    /// The tiles of those that reach many.
+    /// The spans of footprints that do not store them inline.
     pub spans: Vec<TileSpan>,
-    /// What was skipped and why.
+    /// The counts of Gaussians that were skipped, by reason.
     pub counters: Counters,
-    /// What is drawn a period to the right or to the left of where it is, by side.
+    /// The copies a period to the right and to the left, by side.
     pub copies: Vec<ProjectedGroup>,
 }
 

@@ -1,9 +1,9 @@
-//! 2D Gaussians: flat discs whose exact picture is evaluated, not an approximation of it.
+//! Surfels, or 2D Gaussians: flat discs whose exact projection is evaluated, without linearization.
 //!
 //! With the disc's axes `a` and `b` (scaled) and its centre `t`, all in camera axes, a ray `r` meets its plane at
-//! `u a + v b + t`, where `u = (b x t) . r / w`, `v = (t x a) . r / w` and `w = (a x b) . r`: Cramer's rule for the matrix
-//! `[a b t]`. With `r` at `d` pixels from the mean, the numerators are linear in `d` and zero at the mean, where they lose
-//! nothing; `w` is linear, too. Everything is binary64, without fused operations.
+//! `u a + v b + t`, where `u = (b x t) . r / w`, `v = (t x a) . r / w` and `w = (a x b) . r`: Cramer's rule for the
+//! matrix `[a b t]`. With `r` at `d` pixels from the mean, the numerators are linear in `d` and zero at the mean, where
+//! they lose no digits; `w` is linear, too. Everything is binary64, without fused operations.
 
 use super::camera::{LN_2, ViewConstants};
 use super::footprint::{Ellipse, TileFootprint, TileSpan, Visible};
@@ -12,32 +12,32 @@ use super::scratch::Scratch;
 use crate::state::gaussian::CameraModel;
 use fearless_simd::{Simd, f64x8, prelude::*};
 
-/// What a squared distance of 1 takes off an exponent of 2.
+/// The factor from a squared distance to an exponent of 2.
 const UNIT: f64 = 0.5 / std::f64::consts::LN_2;
 
-/// A determinant below this share of what it is a difference of is taken for zero.
+/// The least determinant, relative to its terms, that is not taken for zero.
 const LEAST_DETERMINANT: f64 = 1e-9;
 
-/// A disc on the screen.
+/// A disc in the picture.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Surfel {
-    /// `u w` and `v w` for each pixel in x and y from the mean.
+    /// The gradients of `u w` and `v w` per pixel in x and y. Both are zero at the mean.
     across: [[f64; 2]; 2],
-    /// `w` at the mean, not negative, and how it grows with x and y.
+    /// The value of `w` at the mean, not negative, and its gradient per pixel in x and y.
     scale: [f64; 3],
-    /// Where `w` is not between zero and this, the ray doesn't meet the disc beyond the near plane.
+    /// The upper bound of `w`: the ray meets the disc beyond the near plane only where `w` is between zero and this.
     limit: f64,
-    /// The pixels that it may reach: left, right, top, bottom, in framebuffer pixels.
+    /// The bounding box of pixels that it may reach: left, right, top, bottom, in framebuffer pixels.
     bounds: [f64; 4],
 }
 
-/// Where a disc is, and how it is seen.
+/// The place of a disc in camera space, and the camera.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Placed {
     pub(super) model: CameraModel,
     pub(super) focal: [f64; 2],
     pub(super) near: f64,
-    /// The axes, each as long as its standard deviation, and the centre, in camera axes.
+    /// The axes, each as long as its standard deviation, in camera axes.
     pub(super) axes: [[f64; 3]; 2],
     pub(super) centre: [f64; 3],
 }
@@ -55,7 +55,7 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 }
 
 impl Surfel {
-    /// Of a disc that is placed, without bounds.
+    /// The surfel of a disc, without bounds.
     pub(super) fn new(placed: &Placed) -> Self {
         let [a, b] = placed.axes;
         let [fx, fy] = placed.focal;
@@ -78,7 +78,7 @@ impl Surfel {
         if scale[0] < 0.0 {
             scale = scale.map(|w| -w);
         }
-        // Ratios are what counts: squares shall neither overflow nor vanish.
+        // Only ratios matter. Scaling keeps squares from overflow and underflow.
         let all = [u[0], u[1], v[0], v[1], scale[0], scale[1], scale[2]];
         let largest = all.iter().fold(0.0f64, |a, b| a.max(b.abs()));
         if !(largest > 0.0 && largest.is_finite()) {
@@ -104,8 +104,8 @@ impl Surfel {
         }
     }
 
-    /// The ellipse that the disc and a squared distance of `extent` make on the screen about `mean`; if its plane
-    /// reaches the eye's, everything.
+    /// The ellipse in the picture of the disc out to a squared distance of `extent`. If the disc's plane meets the
+    /// eye's plane there, the ellipse is infinite.
     fn ellipse(&self, mean: [f64; 2], extent: f64) -> Ellipse {
         let [[ux, uy], [vx, vy]] = self.across;
         let [w, wx, wy] = self.scale;
@@ -146,8 +146,8 @@ impl Surfel {
         }
     }
 
-    /// Sets the bounds of what the disc and the filter's circle reach with a squared distance of `extent` about `mean`,
-    /// and finds its tiles, if there are any. Spans that do not fit go to `others`.
+    /// Sets the bounds of the disc and the filter's circle, both out to a squared distance of `extent` about `mean`,
+    /// and returns their tiles, if there are any. Spans that do not fit inline go to `others`.
     pub(super) fn reach(
         &mut self,
         mean: [f64; 2],
@@ -155,7 +155,7 @@ impl Surfel {
         visible: &Visible,
         others: &mut Vec<TileSpan>,
     ) -> Option<TileFootprint> {
-        // What is not a number reaches nothing.
+        // NaN reaches no tile.
         if !(extent >= 0.0 && mean[0].is_finite() && mean[1].is_finite()) {
             return None;
         }
@@ -175,7 +175,7 @@ impl Surfel {
             f64::INFINITY,
             f64::NEG_INFINITY,
         ];
-        // Both hold the mean, so that what they reach in a row of tiles is one span but for tiles between them.
+        // Both shapes contain the mean, so that their union in a row of tiles is taken as one span.
         let mut rows: Vec<(u32, TileSpan)> = Vec::new();
         for shape in shapes.into_iter().flatten() {
             for axis in 0..2 {
@@ -207,7 +207,7 @@ impl Surfel {
         Some(reach)
     }
 
-    /// Which of the blocks of 4x4 pixels of the tile of 16x16 at `corner` it may reach, a bit for each, row by row.
+    /// The blocks of 4x4 pixels that it may reach in the tile of 16x16 pixels at `corner`: a bit for each, row by row.
     pub(crate) fn blocks(&self, corner: [u32; 2]) -> u64 {
         let axis = |axis: usize| {
             let corner = f64::from(corner[axis]);
@@ -231,8 +231,8 @@ impl Surfel {
         blocks
     }
 
-    /// What is taken off the exponents of 2 at eight places, `dx` and `dy` pixels from the mean. `inverse_low_pass` is
-    /// that of the filter's variance, if there is a filter.
+    /// The amount that is subtracted from the exponent of 2 at eight points, `dx` and `dy` pixels from the mean.
+    /// `inverse_low_pass` is the inverse of the filter's variance, if there is a filter.
     #[inline(always)]
     pub(crate) fn falloff<S: Simd>(
         &self,
@@ -257,7 +257,7 @@ impl Surfel {
     }
 }
 
-/// A kept lane as a 2D Gaussian, and the tiles that it reaches, if there are any.
+/// The surfel of a kept Gaussian, and the tiles that it reaches, if there are any.
 pub(super) fn surfel_of(
     view: &ViewConstants,
     at: usize,
@@ -280,7 +280,7 @@ pub(super) fn surfel_of(
         centre: [x[at], y[at], z[at]],
     });
     let flat = &*scratch.flat;
-    // As wide as for volumes: see there.
+    // The same margin as for volumes, in `preprocess`.
     let room = flat.log2_opacity[at] - view.log2_floor;
     let extent = (room + room.abs() * 1e-5 + 1e-3) * (2.0 * LN_2);
     let mean = [flat.mean[0][at], flat.mean[1][at]];
@@ -305,7 +305,7 @@ mod tests {
     const CENTER: [f64; 2] = [80.0, 48.0];
     const LOW_PASS: f64 = 0.5;
 
-    /// What is taken off at a pixel's centre, at the narrowest and at the widest level.
+    /// The falloff at a pixel's centre. Asserts that all SIMD levels give the same bits.
     fn falloff(surfel: &Surfel, d: [f64; 2]) -> f64 {
         let mut found = Vec::new();
         for (_, level) in SimdLevel::supported() {

@@ -1,12 +1,13 @@
-//! Binning: depth-sorted primitives to lists per tile.
+//! Tile lists: bins depth-sorted primitives to a list per tile.
 //!
-//! Sorting comes first, and placement is stable, so that every list is in depth order without a sort of its
-//! own. Workers take runs of the sorted sequence and write down which tiles of a row each primitive reaches, apart for
-//! each band of rows of tiles; then workers take bands, count and place. What primitives reach differs in ways that no
-//! branch foresees, so that what is small is written and placed without any.
+//! Sorting comes first, and placement is stable, so that every list is in depth order without a sort of its own. First,
+//! workers take parts of the sorted sequence and write the runs of tiles that each primitive reaches, separately for
+//! each band of rows of tiles. Then workers take bands, count the entries of each tile, and place them. The number of
+//! tiles of a primitive is hard to predict for the processor, so that small primitives are written and placed without
+//! branches.
 //!
-//! Where lists would outgrow their budget, as those of a million Gaussians that fill a large screen do, there are none:
-//! each tile then walks the sorted sequence itself, a piece at a time, until it is saturated.
+//! If the lists would exceed their budget, as those of a million Gaussians that fill a large screen do, none are made:
+//! each tile then searches the sorted sequence itself, a piece at a time, until it is saturated.
 
 use super::footprint::{HELD_ROWS, PackedSpan, TileFootprint, TileSpan};
 use super::splat::{ProjectedGroup, locate};
@@ -17,12 +18,12 @@ use rayon::prelude::*;
 use std::sync::atomic::AtomicU64;
 use std::sync::atomic::Ordering::Relaxed;
 
-/// The lists of some rows of tiles.
+/// The lists of a band, which is some rows of tiles.
 #[derive(Debug, Default)]
 struct RowBand {
-    /// Where each tile's list begins, row by row.
+    /// The index of the first entry of each tile's list, row by row.
     starts: Vec<u32>,
-    /// Where it ends: there is room for one more behind it.
+    /// The index one past the last entry of each tile's list. One more entry after it is unused.
     ends: Vec<u32>,
     primitives: Vec<u32>,
 }
@@ -30,25 +31,25 @@ struct RowBand {
 /// Lists of primitives by tile, each in the order of the sorted sequence.
 #[derive(Debug)]
 pub(crate) struct TileLists {
-    /// The first row of tiles.
+    /// The first row of tiles that the bounds touch.
     first_row: u32,
-    /// Tiles of a row.
+    /// The number of tiles in a row.
     columns: u32,
-    /// Rows of a band; the last may have fewer.
+    /// The number of rows in a band. The last band may have fewer.
     band_rows: u32,
     bands: Vec<RowBand>,
-    /// What there is instead of lists.
+    /// The sorted sequence, if there are no lists.
     walk: Option<SortedWalk>,
 }
 
-/// A primitive and what it reaches.
+/// A primitive and its footprint.
 type Reaching = (u32, TileFootprint);
 
-/// The survivors in depth order, for tiles to find theirs among them.
+/// The primitives in depth order with their footprints. Each tile searches them for its own.
 #[derive(Debug)]
 pub(crate) struct SortedWalk {
     sorted: Vec<Reaching>,
-    /// Of each group.
+    /// The spans of each group's footprints.
     spans: Vec<Vec<TileSpan>>,
     pairs: u64,
 }
@@ -57,7 +58,7 @@ impl SortedWalk {
     fn new(groups: &mut [ProjectedGroup], order: &[(u32, u32)]) -> Self {
         let mut sorted: Vec<Reaching> = host::with_capacity(order.len());
         let seen = &*groups;
-        // It writes to the room that there is.
+        // It writes into the reserved capacity.
         order
             .par_iter()
             .with_min_len(RUN)
@@ -82,8 +83,8 @@ impl SortedWalk {
         }
     }
 
-    /// Makes `list` the next primitives of a tile, at most so many, from place `from` of the sequence on, which moves
-    /// on. Empty if there are no more.
+    /// Replaces `list` by the next primitives of a tile, at most `most`, from index `from` of the sequence on, and
+    /// advances `from`. `list` is empty if there are no more.
     pub(crate) fn next(
         &self,
         [x, y]: [u32; 2],
@@ -109,7 +110,7 @@ impl SortedWalk {
     }
 }
 
-/// What groups reach, close together.
+/// The footprints of each group, and their spans.
 struct Groups<'a> {
     reaches: Vec<&'a [TileFootprint]>,
     spans: Vec<&'a [TileSpan]>,
@@ -118,24 +119,25 @@ struct Groups<'a> {
 /// The rows of tiles that a draw may touch.
 struct Rows {
     first: u32,
-    /// Of each row: its band, and the number that its first tile has there. One more is for all others.
+    /// The band of each row, and the number in the band of the row's first tile. One more element stands for all other
+    /// rows.
     places: Vec<(u32, u32)>,
-    /// Tiles of a row.
+    /// The number of tiles in a row.
     columns: u32,
 }
 
-/// Tiles that follow one another in a row, and a primitive that reaches them.
+/// Consecutive tiles of a row, and a primitive that reaches them.
 #[derive(Clone, Copy, Debug, Default)]
 struct TileRun {
-    /// The number of its first tile in the band.
+    /// The number in the band of its first tile.
     first: u32,
-    /// The number after that of its last.
+    /// The number after that of its last tile.
     end: u32,
     primitive: u32,
 }
 
 impl TileRun {
-    /// Those of a span in the row whose first tile has number `row_start` in the band.
+    /// The run of a span in the row whose first tile has number `row_start` in the band.
     #[inline(always)]
     fn new(row_start: u32, span: PackedSpan, primitive: u32) -> Self {
         let TileSpan { first, end } = span.into();
@@ -146,32 +148,33 @@ impl TileRun {
         }
     }
 
-    /// The number of its first tile in the band, and that after its last.
+    /// The number in the band of its first tile, and that after its last.
     #[inline(always)]
     fn tiles(self) -> [usize; 2] {
         [self.first as usize, self.end as usize]
     }
 }
 
-/// Runs of a band in the order of primitives. There is room behind them.
+/// The runs of a band in the order of primitives. Elements from `len` on are unused.
 #[derive(Debug)]
 struct TileRuns {
     runs: Vec<TileRun>,
     len: usize,
 }
 
-/// Primitives whose reaches are fetched ahead, and whose runs are counted before the budget is looked at.
+/// The number of primitives whose footprints are prefetched, and whose runs are counted before the budget is checked
+/// again.
 const GATHERED: usize = 64;
 
-/// Runs that there is room for in the beginning, for each primitive: most have one or two.
+/// The initial capacity in runs per primitive. Most primitives have one or two.
 const RUNS_PER_PRIMITIVE: usize = 2;
 
-/// Primitives that a worker brings into order at a time.
+/// The least number of primitives per task in gathering the sorted sequence.
 const RUN: usize = 4096;
 
 impl TileLists {
-    /// Places the survivors named by `order`, in that order, in the lists of the tiles they reach, unless those had more
-    /// than `most_pairs` entries together.
+    /// Places the primitives of `order`, in that order, in the lists of the tiles that they reach. If the lists had
+    /// more than `most_pairs` entries in total, none are made, and tiles search the sorted sequence.
     pub(crate) fn build(
         groups: &mut [ProjectedGroup],
         order: &[(u32, u32)],
@@ -202,7 +205,7 @@ impl TileLists {
             places: host::collect((0..rows).map(places).chain([(bands as u32 - 1, 0)])),
             columns,
         };
-        // No run is without a pair.
+        // Each run has at least one pair.
         let written = AtomicU64::new(0);
         let allow = |more: u64| written.fetch_add(more, Relaxed) + more <= most_pairs;
         let seen = Groups {
@@ -260,20 +263,20 @@ impl TileLists {
         }
     }
 
-    /// What there is instead of lists, if those are too long.
+    /// The sorted sequence that tiles search, if there are no lists.
     pub(crate) fn walk(&self) -> Option<&SortedWalk> {
         self.walk.as_ref()
     }
 
-    /// How many pairs of tile and primitive there are.
+    /// The number of pairs of tile and primitive.
     pub(crate) fn pairs(&self) -> u64 {
-        // Each list has room for one more.
+        // Each list has one unused entry.
         let pairs = |band: &RowBand| (band.primitives.len() - band.starts.len()) as u64;
         let streamed = self.walk.as_ref().map_or(0, |stream| stream.pairs);
         self.bands.iter().map(pairs).sum::<u64>() + streamed
     }
 
-    /// Whether a tile that shares pixels with `rect` has a primitive, or may have one.
+    /// True if a tile that shares pixels with `rect` has a primitive, or may have one.
     pub(crate) fn any_in(&self, rect: Rect) -> bool {
         if self.walk.is_some() {
             return true;
@@ -288,7 +291,7 @@ impl TileLists {
             .any(|y| tiles(rect.x, rect.width).any(|x| !self.list(x, y).is_empty()))
     }
 
-    /// Bytes of host memory that the lists take.
+    /// The bytes of host memory that the lists take.
     pub(crate) fn memory_bytes(&self) -> u64 {
         let bytes =
             |band: &RowBand| 2 * size_of_val(&*band.starts) + size_of_val(&*band.primitives);
@@ -298,8 +301,8 @@ impl TileLists {
 }
 
 impl Rows {
-    /// The runs of a part of the sorted sequence, in its order, by band.
-    /// `None` once the budget does not `allow` for so many more.
+    /// The runs of a part of the sorted sequence, in its order, by band. `None` as soon as `allow` refuses the number
+    /// of runs that were added last.
     fn expand(
         &self,
         groups: &Groups<'_>,
@@ -310,7 +313,7 @@ impl Rows {
         let about = part.len() * RUNS_PER_PRIMITIVE / bands;
         let mut runs = host::collect((0..bands).map(|_| TileRuns::with_room(about)));
         let others = self.places.len() - 1;
-        // Rows without tiles may lie outside.
+        // Inline rows without tiles may lie outside of the bounds.
         let place = |row: u32| self.places[(row.wrapping_sub(self.first) as usize).min(others)];
         let reach_of = |&(_, primitive): &(u32, u32)| {
             let (group, place) = locate(primitive);
@@ -322,7 +325,7 @@ impl Rows {
         let is_one_band = bands == 1;
         let mut ahead = [reach_of(first); GATHERED];
         let mut next = part.chunks(GATHERED);
-        // They lie anywhere, so that each would be waited for.
+        // Footprints are scattered in memory, so they are prefetched.
         let mut fetch = |ahead: &mut [_; GATHERED]| {
             for (reach, named) in ahead.iter_mut().zip(next.next().unwrap_or_default()) {
                 *reach = reach_of(named);
@@ -357,13 +360,13 @@ impl Rows {
     }
 }
 
-/// How many runs are written in all bands.
+/// The number of runs that are written in all bands.
 fn written(runs: &[TileRuns]) -> usize {
     runs.iter().map(|runs| runs.len).sum()
 }
 
 impl TileRuns {
-    /// None yet, with room for about so many.
+    /// Makes an empty list with capacity for about `count` runs.
     fn with_room(count: usize) -> Self {
         Self {
             runs: host::filled(TileRun::default(), count.max(1024)),
@@ -371,8 +374,8 @@ impl TileRuns {
         }
     }
 
-    /// Adds a run of `primitive` for each of some rows that has tiles: the first tile of the first row has number `row_start`,
-    /// and a row has so many `columns`.
+    /// Adds a run of `primitive` for each row that has tiles. The first tile of the first row has number `row_start`,
+    /// and a row has `columns` tiles.
     #[inline(always)]
     fn push_rows(
         &mut self,
@@ -388,7 +391,7 @@ impl TileRuns {
         let mut len = 0;
         for span in spans {
             let run = TileRun::new(row_start, span, primitive);
-            // What has no tiles is written over.
+            // A run without tiles is overwritten by the next.
             room[len] = run;
             len += usize::from(run.first < run.end);
             row_start = row_start.wrapping_add(columns);
@@ -416,17 +419,17 @@ impl TileRuns {
     }
 }
 
-/// Where the lists of a band's tiles begin.
+/// The positions of the lists of a band's tiles.
 struct TileCounts {
-    /// Of each tile, and the end of all. Each list has room for one more.
+    /// The index of each tile's first entry, and the end of all. Each list has one unused entry.
     starts: Vec<u32>,
     pairs: u64,
 }
 
 impl TileCounts {
-    /// Of a band of so many tiles, by its runs.
+    /// The counts of a band of `tiles` tiles, from its runs.
     fn new(runs: &[&[TileRun]], tiles: usize) -> Self {
-        // Changes of the count from tile to tile.
+        // First, the change of the count from each tile to the next.
         let mut starts: Vec<u32> = host::zeroed(tiles + 1);
         for runs in runs {
             for &run in *runs {
@@ -455,7 +458,8 @@ impl RowBand {
         for runs in runs {
             for &run in *runs {
                 let [first, end] = run.tiles();
-                // Most have one tile or two, which no branch foresees: what is not wanted is written over.
+                // Most runs have one tile or two, which is hard to predict. An unwanted entry is overwritten by the
+                // next.
                 let mut put = |tile: usize, wanted: bool| {
                     let end = ends[tile];
                     primitives[end as usize] = run.primitive;
@@ -484,14 +488,14 @@ mod tests {
     proptest! {
         #[test]
         fn lists_are_what_the_spans_say(
-            // Wide enough for spans of more than one strip.
+            // Wide enough for spans of many columns.
             columns in prop_oneof![1..8u16, 1000..2100u16],
             first_row in 0..3u16,
             rows in 1..9u16,
             reached in prop::collection::vec((0..9u16, prop::collection::vec((0..2100u16, 0..2100u16), 0..6)), 1..80),
             threads in 1..5usize,
         ) {
-            // Clipped to the tiles that there are.
+            // Clipped to the grid of tiles.
             let clip = |&(first, len): &(u16, u16)| {
                 let first = first.min(columns - 1);
                 TileSpan { first, end: (first + len).min(columns) }

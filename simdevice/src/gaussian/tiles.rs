@@ -1,5 +1,5 @@
-//! Which of a group's kept Gaussians reach tiles, and which tiles: for several at once where they are small, which most
-//! are, several rows at once where they are not, and one at a time for the others.
+//! The search for the tiles that a group's kept Gaussians reach: for several Gaussians at once if they are small, as
+//! most are; for several rows of one Gaussian at once if it is tall; and one at a time otherwise.
 
 use super::camera::ViewConstants;
 use super::footprint::{Ellipse, HELD_ROWS, PackedSpan, TileFootprint, TileSpan};
@@ -15,34 +15,35 @@ use crate::stats::counters::{Counter, Counters};
 use crate::stats::optimizations::Optimization;
 use fearless_simd::{Simd, prelude::*};
 
-/// Added to a whole number below 2^52, this makes its bits the lowest ones.
+/// The sum of this and an integer below 2^52 has the integer in its low bits.
 const POINT: f64 = (1u64 << 52) as f64;
 
-/// Where numbers are no greater, no square of them overflows.
+/// A bound of magnitudes that keeps squares from overflow.
 const MODERATE: f64 = 1e100;
 
-/// What can be told of several lanes at once.
+/// The result of searching several lanes at once.
 struct Found {
-    /// Those that reach tiles; [`TileFootprints`] holds which.
+    /// The lanes that reach tiles. Their footprints are in the scratch's `reaches`.
     reached: Bits,
-    /// Those that may reach more rows of tiles than a [`TileFootprint`] holds itself.
+    /// The lanes that may reach more rows of tiles than a [`TileFootprint`] stores inline.
     tall: Bits,
-    /// Those of which nothing is told.
+    /// The lanes that must be searched one at a time.
     left: Bits,
 }
 
-/// The least and the greatest pixel along an axis, and their tiles.
+/// The first and the last pixel along an axis, and their tiles.
 struct Range<S: Simd> {
     low: S::f64s,
     high: S::f64s,
     first: S::f64s,
     last: S::f64s,
-    /// Whether there are pixels.
+    /// True if there are pixels.
     any: S::mask64s,
 }
 
 impl<S: Simd> Range<S> {
-    /// As [`centres`](super::footprint), of the whole numbers `first..=last`, in the same steps.
+    /// The integers of `first..=last` whose pixel centres are between `low` and `high`, in the same steps as in
+    /// [`footprint`](super::footprint).
     #[inline(always)]
     fn new(low: S::f64s, high: S::f64s, [first, last]: [S::f64s; 2]) -> Self {
         let low = (low - 0.5).ceil().max(first);
@@ -57,36 +58,36 @@ impl<S: Simd> Range<S> {
         }
     }
 
-    /// How many tiles it has.
+    /// The number of tiles.
     #[inline(always)]
     fn tiles(&self) -> S::f64s {
         self.last - self.first + 1.0
     }
 
-    /// The bits of a span of its tiles.
+    /// The span of its tiles, as the number whose bits are a [`PackedSpan`].
     #[inline(always)]
     fn span(&self) -> S::f64s {
         self.first + (self.last + 1.0) * 65536.0
     }
 }
 
-/// Ellipses, in which rows of tiles are looked for; see [`Ellipse`].
+/// Ellipses whose tiles are searched row by row; see [`Ellipse`].
 struct Ellipses<S: Simd> {
     mean: [S::f64s; 2],
     slope: S::f64s,
     narrowing: S::f64s,
     peak: S::f64s,
-    /// The square of half their extent in y.
+    /// The square of the half extent in y.
     square: S::f64s,
-    /// Their rows of pixels.
+    /// The rows of pixels.
     along: Range<S>,
     /// The first and the last visible column of pixels.
     columns: [S::f64s; 2],
 }
 
 impl<S: Simd> Ellipses<S> {
-    /// What they reach in a row of tiles each, and whether the row is one of theirs and they reach something there, in the
-    /// steps of [`Ellipse::reach`].
+    /// The columns that each ellipse reaches in a row of tiles. The mask is true if the row belongs to the ellipse and
+    /// the ellipse reaches a pixel centre there. The steps are those of [`Ellipse::reach`].
     #[inline(always)]
     fn row(&self, simd: S, row: S::f64s) -> (Range<S>, S::mask64s) {
         let number = |value: f64| S::f64s::splat(simd, value);
@@ -113,7 +114,7 @@ fn last_rounded_to(value: f32) -> f64 {
     if value == f32::INFINITY {
         return f64::INFINITY;
     }
-    // What overflows is half a unit or more beyond the greatest number.
+    // Numbers round to infinity from half a unit above the greatest binary32 number on.
     let wide = |value: f32| {
         if value.is_infinite() {
             2f64.powi(128).copysign(value.into())
@@ -129,7 +130,7 @@ fn last_rounded_to(value: f32) -> f64 {
     }
 }
 
-/// Finds the kept Gaussians that reach a tile.
+/// Finds the kept Gaussians that reach a tile, and their footprints.
 #[inline(always)]
 pub(super) fn find_tiles<S: Simd>(
     view: &ViewConstants,
@@ -143,7 +144,7 @@ pub(super) fn find_tiles<S: Simd>(
     find_tiles_by(view, simd, by_lanes, scratch, out);
 }
 
-/// The same; if not `by_lanes`, one at a time.
+/// The body of [`find_tiles`]. If `by_lanes` is false, it searches one Gaussian at a time.
 #[inline(always)]
 fn find_tiles_by<S: Simd>(
     view: &ViewConstants,
@@ -192,7 +193,8 @@ fn find_tiles_by<S: Simd>(
     out.counters.add(Counter::TilesBesideEllipse, beside);
 }
 
-/// Finds which lanes nothing but tiles and colours can speak against, and counts why the others are skipped.
+/// The lanes that are between the near and far planes and have a positive definite covariance. Counts the reasons to
+/// skip the others.
 #[inline(always)]
 fn find_drawn<S: Simd>(
     view: &ViewConstants,
@@ -211,7 +213,7 @@ fn find_drawn<S: Simd>(
         let load = |lanes: &GroupF64| S::f64s::from_slice(simd, &lanes[at..at + S::f64s::LEN]);
         let depth = load(&scratch.depth);
         let determinant = load(&scratch.flat.determinant);
-        // What is not a number is nowhere.
+        // Comparisons with NaN are false.
         beyond_near.set(at, depth.simd_gt(near));
         beyond_far.set(at, depth.simd_gt(before_far));
         definite.set(
@@ -231,8 +233,8 @@ fn find_drawn<S: Simd>(
     seen.and(&definite)
 }
 
-/// The tiles of the lanes of `drawn` that reach but few rows of tiles: what [`Ellipse::reach`] finds, in the same
-/// steps. Adds what it adds to `beside`.
+/// The footprints of the lanes of `drawn` that reach at most [`HELD_ROWS`] rows of tiles. The results and steps are
+/// those of [`Ellipse::reach`]. Adds the number of tiles of bounding boxes that ellipses do not reach to `beside`.
 #[inline(always)]
 fn reach_in_lanes<S: Simd>(
     view: &ViewConstants,
@@ -265,7 +267,7 @@ fn reach_in_lanes<S: Simd>(
         let (half_x, half_y) = (load(&half[0]), load(&half[1]));
         let (slope, narrowing, peak) = (load(slope), load(narrowing), load(peak));
         let drawn = S::mask64s::from_bitmask(simd, drawn.group(at, S::f64s::LEN));
-        // The square root of a negative extent is not a number.
+        // The square root of a negative extent is NaN.
         let drawn = drawn & half_y.simd_ge(zero);
         let size = x.abs() + y.abs() + half_x + half_y + slope.abs() + narrowing + peak.abs();
         let moderate = size.simd_le(number(MODERATE));
@@ -297,7 +299,7 @@ fn reach_in_lanes<S: Simd>(
         let mut reached = zero;
         let mut spans = [zero; HELD_ROWS];
         for (number, span) in spans.iter_mut().enumerate() {
-            // Most have two rows or one.
+            // Most have one or two rows.
             let any = inside & short & row.simd_le(along.last);
             if !any.any_true() {
                 break;
@@ -333,11 +335,11 @@ fn reach_in_lanes<S: Simd>(
     found
 }
 
-/// The numbers of lanes.
+/// The lane numbers of a vector.
 const NUMBERS: [f64; 8] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
 
-/// The tiles of a lane that [`reach_in_lanes`] calls tall, if it reaches some: several rows at once, in the steps of
-/// [`Ellipse::reach`].
+/// The footprint of a lane that [`reach_in_lanes`] found to be tall, if it reaches tiles: several rows at once, in the
+/// steps of [`Ellipse::reach`].
 #[inline(always)]
 fn reach_by_rows<S: Simd>(
     view: &ViewConstants,
@@ -387,7 +389,7 @@ fn reach_by_rows<S: Simd>(
     (reached > 0).then_some(reach)
 }
 
-/// The tiles of a lane, if it reaches some.
+/// The footprint of a lane, if it reaches tiles.
 #[inline(never)]
 fn reach_of_one(
     view: &ViewConstants,
@@ -407,7 +409,7 @@ fn reach_of_one(
         narrowing: flat.narrowing[at],
         peak: flat.peak[at],
     };
-    // The square root of a negative extent is not a number.
+    // The square root of a negative extent is NaN.
     if ellipse.half[1].is_nan() {
         return None;
     }
@@ -435,10 +437,10 @@ mod tests {
     use devmem::dispatch;
     use proptest::prelude::*;
 
-    /// Rows, each with its first tile and one past its last.
+    /// The rows, each with its first tile and one past its last.
     type Spans = Vec<(u32, u16, u16)>;
 
-    /// What is found of a group: the spans of each lane that is reached, and counters.
+    /// The result for a group: the spans of each lane that reaches tiles, and the counters.
     #[derive(Debug, PartialEq)]
     struct Tiles {
         reached: Vec<(usize, Spans)>,
@@ -491,7 +493,7 @@ mod tests {
         }
     }
 
-    /// Numbers such as occur, among them those where something begins or ends, and such as should not.
+    /// Typical coordinates, those at edges of pixels and tiles, and invalid ones.
     fn place() -> impl Strategy<Value = f64> {
         prop_oneof![
             8 => -30.0..230.0f64,
@@ -500,7 +502,7 @@ mod tests {
         ]
     }
 
-    /// Standard deviations along both axes, in pixels, as an angle turns them.
+    /// Standard deviations along both axes, in pixels, and the angle of the first axis.
     fn shape() -> impl Strategy<Value = [f64; 3]> {
         (0.05..12.0f64, 0.05..6.0f64, 0.0..3.2f64).prop_map(|(a, b, angle)| [a, b, angle])
     }

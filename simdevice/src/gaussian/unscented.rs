@@ -1,9 +1,9 @@
-//! The unscented transform: points that stand for a Gaussian are projected, and their mean and covariance are those of its
-//! picture.
+//! The unscented transform: projects points that represent a Gaussian, and takes the mean and covariance of their
+//! projections.
 //!
-//! Seven points stand for it: its mean, and one on either side along each of its axes at sqrt(3) standard deviations. In
-//! the usual terms alpha is 1, beta 2 and kappa 0, so that the weights are 0 and 1/6 in the mean, 2 and 1/6 in the
-//! covariance: none is negative, and the covariance is one.
+//! There are seven points: the mean, and one on either side along each axis at sqrt(3) standard deviations. In the
+//! usual terms alpha is 1, beta 2 and kappa 0, so that the weights are 0 and 1/6 in the mean, 2 and 1/6 in the
+//! covariance. No weight is negative, so that the covariance is positive semidefinite.
 
 use super::camera::{ViewConstants, linearize};
 use super::lanes::GROUP;
@@ -14,17 +14,17 @@ use crate::mistakes::Mistake;
 use crate::state::gaussian::CameraModel;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-/// The distance of the points from the mean, in standard deviations: the root of the number of dimensions.
+/// The distance of the points from the mean, in standard deviations: the square root of the number of dimensions.
 const DISTANCE: f64 = 1.732_050_807_568_877_2;
 
-/// Weights: of the mean in the covariance, and of each other point.
+/// The weight of the mean's point in the covariance; `OTHER` is the weight of each other point.
 const CENTER: f64 = 2.0;
 const OTHER: f64 = 1.0 / 6.0;
 
-/// Points of a Gaussian.
+/// The number of points of a Gaussian.
 const POINTS: usize = 7;
 
-/// A Gaussian in the picture: its mean, and of its covariance the diagonal, what is beside it, and the determinant.
+/// The mean of a Gaussian in the picture, and the elements and determinant of its covariance.
 #[derive(Clone, Copy, Debug)]
 struct Moments {
     mean: [f64; 2],
@@ -34,7 +34,8 @@ struct Moments {
     determinant: f64,
 }
 
-/// Means and covariances of the kept Gaussians, whose Jacobians were found: they stand in where some point is not seen.
+/// Computes means and covariances of the kept Gaussians. Where the camera does not see all points, the Jacobian is
+/// used, which must be computed already.
 pub(super) fn transform(view: &ViewConstants, by_matrices: bool, scratch: &mut Scratch) {
     let r = &view.rotation;
     let placed = scratch.placed.as_deref().filter(|_| by_matrices);
@@ -79,14 +80,14 @@ pub(super) fn transform(view: &ViewConstants, by_matrices: bool, scratch: &mut S
     }
 }
 
-/// The axes of a Gaussian, as long as its standard deviations.
+/// The axes of a Gaussian, each as long as its standard deviation.
 fn axes(quaternion: [f64; 4], scale: [f64; 3]) -> [[f64; 3]; 3] {
     let columns = ray_depth::axes(quaternion);
     [0, 1, 2].map(|axis| columns[axis].map(|c| c * scale[axis]))
 }
 
-/// The picture of a Gaussian at `t` with these axes, all in camera axes, for focal lengths of 1; `None` if a camera does
-/// not see all its points, or not all of them side by side.
+/// The moments in the picture of a Gaussian at `t` with these axes, all in camera axes, for focal lengths of 1. `None`
+/// if the camera does not see all its points, or an edge of the picture separates them.
 fn of_points(model: CameraModel, near: f64, t: [f64; 3], axes: [[f64; 3]; 3]) -> Option<Moments> {
     let straight = place(model, t);
     let mut places = [straight; POINTS];
@@ -126,8 +127,8 @@ fn of_points(model: CameraModel, near: f64, t: [f64; 3], axes: [[f64; 3]; 3]) ->
     })
 }
 
-/// Sums of squares and products, and the determinant of the matrix that they make: a sum of squares itself, so that
-/// nothing is lost where deviations are almost on a line.
+/// The sums xx, xy and yy of squares and products, and the determinant of their matrix. The determinant is itself
+/// summed from squares, so that no digits cancel where deviations are almost on a line.
 fn sums(deviations: &[[f64; 2]]) -> (f64, f64, f64, f64) {
     let (mut xx, mut xy, mut yy, mut determinant) = (0.0, 0.0, 0.0, 0.0);
     for (number, &[x, y]) in deviations.iter().enumerate() {
@@ -147,8 +148,9 @@ fn place(model: CameraModel, t: [f64; 3]) -> [f64; 2] {
     linearize(model, unbounded, t).0
 }
 
-/// Whether the point of a Gaussian at `t` is seen beside it: beyond the near plane, or, by cameras that see all around,
-/// less than a right angle from it, with no point between or around them where the picture is torn.
+/// True if the camera sees `point` of a Gaussian at `t`, and the projection is continuous between them. A pinhole sees
+/// points beyond the near plane. Cameras that see all around accept points at less than a right angle from `t`, with no
+/// singularity of the projection as near as that.
 fn is_seen(model: CameraModel, near: f64, t: [f64; 3], point: [f64; 3]) -> bool {
     let angle = || length(cross(t, point)).atan2(dot(t, point));
     let [x, y, z] = t;
@@ -166,7 +168,7 @@ fn is_seen(model: CameraModel, near: f64, t: [f64; 3], point: [f64; 3]) -> bool 
     }
 }
 
-/// An angle less whole turns: from -pi up to pi.
+/// An angle modulo a whole turn, in [-pi, pi), if it is at most one turn outside.
 fn wrapped(angle: f64) -> f64 {
     if angle >= PI {
         angle - TAU

@@ -1,5 +1,5 @@
-//! Gaussians that a vertex program projects: it writes centre, covariance, opacity, colour and perhaps the depth key of
-//! each, and what follows is as with fixed-function projection.
+//! Gaussians that a vertex program projects. It writes centre, covariance, opacity, colour and perhaps the depth key of
+//! each; the stages after that are those of fixed-function projection.
 
 use super::camera::ViewConstants;
 use super::depth::CenterDepth;
@@ -25,25 +25,25 @@ use rayon::prelude::*;
 use std::sync::atomic::AtomicBool;
 use std::sync::atomic::Ordering::Relaxed;
 
-/// Groups that a worker takes at a time, so that its shader is made rarely.
+/// The least number of groups per task, so that few shaders are created.
 const GROUPS_PER_TASK: usize = 16;
 
-/// How what the program writes becomes a Gaussian on the screen.
+/// The conversion of a program's outputs to Gaussians in the picture.
 struct Shading {
-    /// What is the same for Gaussians of any origin.
+    /// The constants that the stages after projection need.
     constants: ViewConstants,
-    /// Half the viewport's extent and its middle, in framebuffer pixels.
+    /// Half the viewport's extent, in framebuffer pixels; `middle` is its middle.
     half: [f64; 2],
     middle: [f64; 2],
     order: GaussianOrder,
-    /// Where the depth key is among the varyings, if it is there.
+    /// True if the program writes the depth key.
     writes_key: bool,
     depth: Option<CenterDepth>,
 }
 
-/// Gaussians of a group that were kept, densely: what the program wrote of each.
+/// The program's outputs for the kept Gaussians of a group, densely packed.
 struct Outputs {
-    /// In clip space.
+    /// The position in clip space.
     position: [GroupF64; 4],
     covariance: [GroupF64; 3],
     opacity: GroupF64,
@@ -51,7 +51,7 @@ struct Outputs {
     key: [f32; GROUP],
 }
 
-/// A group to shade: of which instance, and the place of its first Gaussian in that and in the set.
+/// A group to shade: its instance, and the number of its first Gaussian in the instance and in the set.
 #[derive(Clone, Copy)]
 struct GroupTask {
     instance: u32,
@@ -59,7 +59,7 @@ struct GroupTask {
     sequence: u32,
 }
 
-/// What a worker keeps from one group to the next.
+/// The state that a worker reuses from one group to the next.
 struct Worker<'a> {
     shader: PointShader<'a>,
     shading: Shading,
@@ -67,13 +67,13 @@ struct Worker<'a> {
     scratch: Scratch,
 }
 
-/// How many groups a draw takes.
+/// The number of groups of a draw.
 pub(super) fn groups(draw: &Draw) -> u64 {
     let per_instance = draw.count.div_ceil(GROUP as u32);
     u64::from(per_instance) * u64::from(draw.instance_count)
 }
 
-/// Bytes that a draw's vertices take as they are read, and as the Gaussians that the program writes.
+/// The bytes of a draw's vertex attributes and indices, and of the Gaussians that the program writes.
 pub(super) fn vertex_bytes(draw: &Draw) -> u64 {
     let attributes = draw.attributes.iter();
     let read: usize = attributes.map(|stream| stream.format.texel_size()).sum();
@@ -86,10 +86,7 @@ pub(super) fn vertex_bytes(draw: &Draw) -> u64 {
     vertices * (read as u64 + u64::from(index) + written)
 }
 
-/// Shades and projects what vertex programs project of a set.
-///
-/// # Errors
-/// [`Stopped`] if a program ran for too long.
+/// Shades and projects the Gaussians of a set that vertex programs project.
 pub(super) fn project_all(
     set: &GaussianSet,
     runtime: &Runtime,
@@ -163,7 +160,7 @@ fn project(
             .collect_into_vec(&mut done);
     });
     draw.vertex_bindings.bump_generations();
-    // That others were cancelled tells nothing.
+    // The error of the program that failed is reported, not the cancellation of others.
     let failures = done.iter().filter_map(|done| done.as_ref().err());
     match failures.min_by_key(|stopped| **stopped == Stopped::Cancelled) {
         Some(stopped) => Err(*stopped),
@@ -207,7 +204,7 @@ impl Shading {
         let state = &set.begin.state;
         let visible = Visible::from(set.bounds);
         let optimizations = runtime.config().optimizations;
-        // The clip volume takes the place of the camera's planes.
+        // The clip volume replaces the camera's planes.
         let camera = Camera {
             near_plane: f32::NEG_INFINITY,
             ..Camera::default()
@@ -226,7 +223,7 @@ impl Shading {
         }
     }
 
-    /// Packs the Gaussians that nothing is known against yet, and counts the first reason to skip the others.
+    /// Packs the Gaussians that no test culls, and counts the others by the first reason to skip them.
     fn keep(
         &self,
         shader: &PointShader<'_>,
@@ -280,14 +277,14 @@ impl Shading {
             }
             kept.opacity[at] = opacity.into();
             kept.color[at] = color;
-            // Zero has no sign where depths are compared.
+            // Negative zero becomes zero, so that both compare as equal.
             kept.key[at] = key + 0.0;
             scratch.lanes.push(lane);
         }
         scratch.kept = Bits::first(scratch.lanes.len());
     }
 
-    /// Finds mean, covariance and opacity on the screen of the kept Gaussians.
+    /// Computes mean, covariance and opacity in the picture for the kept Gaussians.
     #[inline(always)]
     fn flatten<S: Simd>(&self, simd: S, kept: &Outputs, scratch: &mut Scratch) {
         let count = scratch.lanes.len();
@@ -308,8 +305,8 @@ impl Shading {
             }
             let [xx, xy, yy] = &kept.covariance;
             let (xx, xy, yy) = (load(xx), load(xy), load(yy));
-            // Products of binary32 numbers are exact in binary64. Rounding in the program may have left less than
-            // nothing, of which there is no root, and a logarithm of what is no number is that of zero.
+            // Products of binary32 numbers are exact in binary64. Rounding in the program may have made the difference
+            // negative. Its square root is then NaN, and `log2` gives negative infinity.
             let area2 = xx * yy - xy * xy;
             let constants = &self.constants;
             shape(
@@ -322,15 +319,15 @@ impl Shading {
                 flat,
             );
             let determinant = load(&flat.determinant);
-            // Both diagonal elements are positive, or neither is, where the determinant is positive.
+            // If the determinant is positive, the diagonal elements have the same sign.
             let definite = (xx + constants.low_pass).simd_gt(zero);
             store(definite.select(determinant, zero), &mut flat.determinant);
-            // In front of no plane that is left.
+            // The planes that remain are at infinity.
             store(zero, depth);
         }
     }
 
-    /// Finds the tiles of the kept Gaussians and appends what reaches some to `out`.
+    /// Finds the tiles of the kept Gaussians and appends those that reach some to `out`.
     fn emit(
         &self,
         level: Level,

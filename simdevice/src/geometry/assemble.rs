@@ -1,17 +1,17 @@
-//! Primitive assembly: which vertices of a run make each primitive (Vulkan 1.3, "Primitive Topologies").
+//! Primitive assembly: the vertices of each primitive in a run (Vulkan 1.3, "Primitive Topologies").
 
 use crate::state::Topology;
 
-/// A primitive's vertices by their place in the run of vertices that is not interrupted by a restart.
+/// A primitive's vertices, each by its place in a run, which is a sequence of vertices without a restart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Corners {
-    /// As many as the topology's primitives have; the rest repeat the last one.
+    /// The places of the vertices. For points and lines, the last one is repeated.
     pub places: [u32; 3],
-    /// Which of them is the provoking vertex.
+    /// The index in `places` of the provoking vertex.
     pub provoking: usize,
 }
 
-/// Corners of a primitive: 1 for points, 2 for lines, 3 for triangles.
+/// The number of corners of a primitive: 1 for points, 2 for lines, 3 for triangles.
 pub(super) fn corner_count(topology: Topology) -> usize {
     use Topology::*;
     match topology {
@@ -21,7 +21,7 @@ pub(super) fn corner_count(topology: Topology) -> usize {
     }
 }
 
-/// How many primitives a run of vertices makes.
+/// The number of primitives in a run of vertices.
 pub(super) fn primitive_count(topology: Topology, vertices: u32) -> u32 {
     use Topology::*;
     match topology {
@@ -48,7 +48,7 @@ pub(super) fn corners(topology: Topology, last: bool, number: u32) -> Corners {
         LineList => ([2 * i, 2 * i + 1, 2 * i + 1], [0, 1]),
         LineStrip => ([i, i + 1, i + 1], [0, 1]),
         TriangleList => ([3 * i, 3 * i + 1, 3 * i + 2], [0, 2]),
-        // The two later vertices of odd triangles change places, so that all face alike.
+        // The two later vertices of odd triangles are exchanged, so that all triangles have the same winding.
         TriangleStrip => ([i, i + 1 + odd, i + 2 - odd], [0, 2 - odd as usize]),
         TriangleFan => ([i + 1, i + 2, 0], [0, 1]),
         LineListWithAdjacency => ([4 * i + 1, 4 * i + 2, 4 * i + 2], [0, 1]),
@@ -65,7 +65,7 @@ pub(super) fn corners(topology: Topology, last: bool, number: u32) -> Corners {
     }
 }
 
-/// The places that primitives `first..end` use, as a range. A fan uses place 0, too ([`uses_pivot`]).
+/// The range of places that primitives `first..end` use. A fan also uses place 0 ([`uses_pivot`]).
 pub(super) fn places(topology: Topology, first: u32, end: u32) -> std::ops::Range<u32> {
     use Topology::*;
     match topology {
@@ -82,7 +82,7 @@ pub(super) fn places(topology: Topology, first: u32, end: u32) -> std::ops::Rang
     }
 }
 
-/// Whether every primitive uses the run's first vertex.
+/// True if every primitive uses the run's first vertex.
 pub(super) fn uses_pivot(topology: Topology) -> bool {
     topology == Topology::TriangleFan
 }

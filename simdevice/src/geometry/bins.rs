@@ -1,18 +1,18 @@
-//! Binning: which primitives each macro-tile has to look at.
+//! Binning: the list of primitives of each macro-tile.
 
 use super::primitive::Primitive;
 use crate::simd::{both, three};
 use crate::state::Rect;
 use devmem::host;
 
-/// The macro-tiles that a pass's area touches.
+/// The grid of macro-tiles that a pass's area touches.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Grid {
     /// The side of a macro-tile in pixels.
     size: i32,
-    /// 2^32 / size, rounded up: multiplication by it divides any pixel's coordinate.
+    /// 2^32 / size, rounded up. A multiplication by it replaces the division of a coordinate by the size.
     reciprocal: u64,
-    /// The column and row of the first.
+    /// The column and row of the first macro-tile.
     first: [u32; 2],
     columns: u32,
     rows: u32,
@@ -44,17 +44,17 @@ impl Grid {
     }
 }
 
-/// Pixels first to last in x, and in y, both inclusive and within the pass's area.
+/// A rectangle of pixels in the pass's area: the first and the last in x, and in y, both inclusive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Pixels {
     pub x: [i32; 2],
     pub y: [i32; 2],
 }
 
-/// A macro-tile of a grid and a primitive that may touch it.
+/// The number of a macro-tile in a grid, and a primitive that may touch it.
 pub(super) type Pair = (u32, u32);
 
-/// Adds the macro-tiles that a primitive, which covers nothing outside `pixels`, may touch.
+/// Appends a pair for each macro-tile that a primitive may touch. The primitive covers nothing outside `pixels`.
 pub(super) fn bin(
     grid: &Grid,
     primitive: &Primitive,
@@ -87,7 +87,7 @@ pub(super) fn bin(
     }
 }
 
-/// The edges of a primitive: the value of each at x, y is `at + x * along[0] + y * along[1]`, positive inside.
+/// The edge functions of a primitive: at x, y each is `at + x * along[0] + y * along[1]`, positive inside.
 struct Outline {
     edges: [(i64, [i64; 2]); 4],
 }
@@ -107,7 +107,7 @@ impl Outline {
         Self { edges }
     }
 
-    /// Whether it may share a point with the square of pixels from `corner` on.
+    /// True if it may share a point with the square of `size` pixels whose top left corner is `corner`.
     fn touches(&self, corner: [i64; 2], size: i32) -> bool {
         let (low, side) = (both(corner, |c| 256 * c), 256 * i64::from(size));
         self.edges.iter().all(|&(at, along)| {
@@ -118,28 +118,28 @@ impl Outline {
     }
 }
 
-/// How many lists may be empty before only those that aren't are kept.
+/// The number of lists up to which a list is kept for every macro-tile, even if most are empty.
 const DENSE_LISTS: usize = 4096;
 
 /// Lists of primitives by macro-tile and layer, each in order.
 #[derive(Debug, Default)]
 pub struct Bins {
-    /// The first column and row.
+    /// The grid's first column and row.
     origin: [u32; 2],
     columns: u32,
     rows: u32,
     layers: u32,
-    /// The macro-tile, numbered by layer, row and column, that the first list is of.
+    /// The macro-tile of the first list. Macro-tiles are numbered by layer, row and column.
     first: u32,
-    /// The macro-tiles that have lists, ascending; empty if all from the first to the last have.
+    /// The macro-tiles that have lists, in ascending order. Empty if all from the first to the last have one.
     tiles: Box<[u32]>,
-    /// Where each list begins, and where the last one ends.
+    /// The index of each list's first entry, and the end of the last list.
     starts: Box<[u32]>,
     primitives: Box<[u32]>,
 }
 
 impl Bins {
-    /// Sorts pairs by macro-tile; those of one keep their order.
+    /// The lists of these pairs. A list keeps the order of its pairs.
     pub(super) fn new(grid: &Grid, layers: u32, pairs: &[Pair]) -> Self {
         let tiles = pairs.iter().map(|pair| pair.0);
         let (mut first, mut last) = (u32::MAX, 0);
@@ -184,7 +184,7 @@ impl Bins {
         bins
     }
 
-    /// The number of a macro-tile's list.
+    /// The number of a macro-tile's list, if it has one.
     #[inline]
     fn list(&self, tile: u32) -> Option<usize> {
         if self.tiles.is_empty() {
@@ -216,7 +216,7 @@ impl Bins {
         }
     }
 
-    /// The primitives of all lists, list by list, to be given other names.
+    /// The entries of all lists, list by list, so that primitives can be renumbered.
     pub(super) fn names_mut(&mut self) -> &mut [u32] {
         &mut self.primitives
     }
@@ -238,18 +238,18 @@ impl Bins {
         Self::new(&grid, layers, &pairs)
     }
 
-    /// How many pairs of a macro-tile and a primitive there are.
+    /// The number of pairs of a macro-tile and a primitive.
     pub fn pairs(&self) -> u64 {
         self.primitives.len() as u64
     }
 
-    /// Bytes of host memory that the lists take.
+    /// The bytes of host memory that the lists take.
     pub(super) fn memory_bytes(&self) -> usize {
         size_of_val(&*self.starts) + size_of_val(&*self.tiles) + size_of_val(&*self.primitives)
     }
 }
 
-/// The number of a macro-tile, by column, row and layer, of so many columns and rows.
+/// The number of a macro-tile, given its column, row and layer, in a grid of `columns` and `rows`.
 fn tile_number(columns: u32, rows: u32, [column, row, layer]: [u32; 3]) -> u32 {
     (layer * rows + row) * columns + column
 }

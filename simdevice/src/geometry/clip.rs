@@ -1,35 +1,35 @@
-//! Clipping in homogeneous coordinates. Where an edge of the primitive meets a plane is always computed from the edge's
-//! corners, in a form that gives the same whichever comes first, so that polygons which share the edge agree on it bit
-//! for bit; and from products that are exact, so that an edge whose corners are ever so far outside stays where it is.
+//! Clipping in homogeneous coordinates. The intersection of a primitive's edge with a plane is always computed from the
+//! edge's original corners, in a form that does not depend on their order, so that polygons that share the edge get the
+//! same bits. The products in it are exact, so that an edge stays in place however far outside its corners are.
 
 use super::viewport::{LEAST_W, Transform};
 use crate::limits::MAX_CLIP_CULL_DISTANCES;
 
-/// A vertex while its polygon is clipped.
+/// A vertex of a polygon during clipping.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct ClipVertex {
-    /// In clip space.
+    /// The position in clip space.
     pub position: [f64; 4],
-    /// How much of each of the primitive's corners it is, in clip space; they add up to 1.
+    /// The barycentric weights of the primitive's corners, in clip space. Their sum is 1.
     pub weights: [f64; 3],
-    /// Whether the edge from here to the next vertex belongs to the primitive's outline.
+    /// True if the edge from this vertex to the next belongs to the primitive's outline.
     pub edge: bool,
 }
 
 /// The most vertices of a polygon: three corners, and one more for each plane.
 pub(super) const MOST_VERTICES: usize = 3 + PLANES + MAX_CLIP_CULL_DISTANCES;
 
-/// near, far, w, and four of the guard band.
+/// The view volume's planes: near, far, least w, and the four of the guard band.
 const PLANES: usize = 7;
 
-/// A convex polygon.
+/// A convex polygon during clipping.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Polygon {
     vertices: [ClipVertex; MOST_VERTICES],
     len: usize,
 }
 
-/// A plane to clip by.
+/// A plane to clip against.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Plane {
     Near,
@@ -49,15 +49,15 @@ const FRUSTUM: [Plane; PLANES] = [
     Plane::Guard(3),
 ];
 
-/// A primitive's corners in clip space, as they were given: numbers of binary32.
+/// The positions of a primitive's corners in clip space. All are binary32 numbers.
 type Corners = [[f64; 4]; 3];
 
-/// What a primitive is clipped by.
+/// The planes against which a primitive is clipped.
 pub(super) struct Clipper<'a> {
     pub transform: &'a Transform,
     /// The user clip distances of each corner.
     pub distances: [[f32; MAX_CLIP_CULL_DISTANCES]; 3],
-    /// How many of them there are.
+    /// The number of user clip distances.
     pub distance_count: usize,
 }
 
@@ -71,7 +71,7 @@ impl Clipper<'_> {
         frustum.chain(user)
     }
 
-    /// How far a vertex is inside a plane; negative outside.
+    /// The distance of a vertex from a plane: positive inside, negative outside.
     fn distance(&self, plane: Plane, vertex: &ClipVertex) -> f64 {
         let [_, _, z, w] = vertex.position;
         match plane {
@@ -91,7 +91,7 @@ impl Clipper<'_> {
         }
     }
 
-    /// Where the edge between two vertices of which only one is inside the plane meets it.
+    /// The intersection of a plane with the edge between two vertices, of which `a` is inside and `b` outside.
     fn meet(&self, plane: Plane, corners: &Corners, a: &ClipVertex, b: &ClipVertex) -> ClipVertex {
         let of_primitive = (0..3).find(|&other| a.weights[other] == 0.0 && b.weights[other] == 0.0);
         let on_edge = of_primitive
@@ -107,7 +107,7 @@ impl Clipper<'_> {
                 edge: false,
             }
         });
-        // What rounding may have moved off the plane.
+        // Rounding may have moved the vertex off the plane.
         let position = &mut new.position;
         match plane {
             Plane::Near => position[2] = 0.0,
@@ -125,9 +125,10 @@ impl Clipper<'_> {
         new
     }
 
-    /// Where the edge between two corners p and q meets the plane: (p_i D(q) - q_i D(p)) / (D(q) - D(p)), with the
-    /// distance D written out, since it has the corners' magnitude and would round away where between them the plane is.
-    /// What is left are differences of products of two binary32 numbers, which are exact here.
+    /// The intersection of a plane with the edge between two corners p and q: (p_i D(q) - q_i D(p)) / (D(q) - D(p)).
+    /// The distance D is written out, because if it is large compared to the edge, rounding it would lose the position
+    /// of the intersection. The remaining terms are differences of products of two binary32 numbers, and the products
+    /// are exact here.
     fn meet_edge(&self, plane: Plane, corners: &Corners, [p, q]: [usize; 2]) -> ClipVertex {
         let [at_p, at_q] =
             [p, q].map(|corner| self.distance(plane, &ClipVertex::at(corners, corner)));
@@ -154,7 +155,7 @@ impl Clipper<'_> {
         }
     }
 
-    /// Clips a triangle. Less than three vertices are left of one that is invisible.
+    /// Clips a triangle. Fewer than three vertices remain of an invisible one.
     pub(super) fn triangle(&self, corners: [[f32; 4]; 3]) -> Polygon {
         let corners = corners.map(|position| position.map(f64::from));
         let mut polygon = Polygon::default();
@@ -188,7 +189,8 @@ impl Clipper<'_> {
                 out.push(*here.0);
                 if next.1 < 0.0 {
                     let mut new = self.meet(plane, corners, here.0, next.0);
-                    // The volume's own planes leave no outline, as if nothing had been clipped.
+                    // Edges along the view volume's own planes are not part of the outline, as if nothing had been
+                    // clipped.
                     new.edge = matches!(plane, Plane::User(_));
                     out.push(new);
                 }
@@ -202,7 +204,7 @@ impl Clipper<'_> {
         out
     }
 
-    /// Clips a line; `None` if nothing is left of it.
+    /// Clips a line; `None` if nothing remains of it.
     pub(super) fn line(&self, ends: [[f32; 4]; 2]) -> Option<[ClipVertex; 2]> {
         let [a, b] = ends.map(|position| position.map(f64::from));
         let corners = [a, b, [0.0; 4]];
@@ -222,12 +224,12 @@ impl Clipper<'_> {
 }
 
 impl Polygon {
-    /// Its vertices in order.
+    /// The vertices in order.
     pub(super) fn vertices(&self) -> &[ClipVertex] {
         &self.vertices[..self.len]
     }
 
-    /// Adds a vertex. A polygon that rounding has bent so much that it has too many loses the last.
+    /// Adds a vertex. If rounding has made a polygon so irregular that it has too many vertices, the last are dropped.
     fn push(&mut self, vertex: ClipVertex) {
         if let Some(entry) = self.vertices.get_mut(self.len) {
             *entry = vertex;
@@ -237,7 +239,7 @@ impl Polygon {
 }
 
 impl ClipVertex {
-    /// A corner of the primitive.
+    /// A corner of the primitive as a vertex.
     fn at(corners: &Corners, corner: usize) -> Self {
         Self {
             position: corners[corner],
@@ -246,7 +248,7 @@ impl ClipVertex {
         }
     }
 
-    /// The corner that it is, if it isn't new.
+    /// The corner that this vertex is, if clipping did not make it.
     pub(super) fn corner(&self) -> Option<usize> {
         let ones = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         ones.iter().position(|one| self.weights == *one)

@@ -4,17 +4,17 @@ use super::viewport::WindowVertex;
 use crate::format::{Channel, Format, Numeric};
 use crate::state::DepthBias;
 
-/// The least difference of depths that a depth attachment is sure to tell apart.
+/// The smallest difference of depths that a depth attachment resolves, as Vulkan's `r`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum DepthUnit {
-    /// The same everywhere.
+    /// The same for all depths.
     Fixed(f32),
-    /// That of a binary32 number as large as the polygon's greatest depth.
+    /// The unit in the last place of a binary32 number with the exponent of the polygon's greatest depth.
     Float,
 }
 
 impl DepthUnit {
-    /// That of a pass's depth attachment; without one it is as if it had 24 bits.
+    /// The unit of a pass's depth attachment; that of 24 bits if there is none.
     pub(super) fn of(format: Option<Format>) -> Self {
         let depth = format.and_then(|format| {
             let bits = format.components().iter();
@@ -43,7 +43,7 @@ impl DepthUnit {
     }
 }
 
-/// What is added to the depth of a triangle.
+/// The bias that is added to the depth of a triangle.
 pub(super) fn bias(bias: &DepthBias, unit: DepthUnit, corners: [&WindowVertex; 3]) -> f32 {
     let [a, b, c] = corners;
     let difference = |to: &WindowVertex, from: &WindowVertex| {

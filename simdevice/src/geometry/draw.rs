@@ -1,4 +1,4 @@
-//! What the front end hands to the rasterizer: a draw as segments of primitives that are binned.
+//! Draws after the front end: segments of binned primitives, which are the input of the rasterizer.
 
 use crate::geometry::Bins;
 use crate::geometry::primitive::{Primitive, Varyings};
@@ -16,30 +16,30 @@ pub struct PrimitiveDraw {
     pub pipeline: Arc<DrawPipeline>,
     /// The state.
     pub state: Arc<DrawState>,
-    /// What the fragment program is bound to.
+    /// The bindings of the fragment program.
     pub bindings: Bindings,
     /// The primitives, in order.
     pub segments: Vec<PrimitiveSegment>,
-    /// The pixels that they may touch, by viewport: those of the pass's area that lie in the scissor and in the
-    /// viewport. Primitives may reach farther.
+    /// The pixels that they may touch, by viewport: the pass's area, cut to the scissor and the viewport. Primitives
+    /// may extend beyond them.
     pub regions: Vec<Rect>,
-    /// Where the work of its tiles goes, if anybody wants to know.
+    /// The record to which the work of its tiles is added, if there is a recorder.
     pub(crate) record: Option<Arc<DrawRecord>>,
 }
 
 /// Consecutive primitives of a draw that were set up together.
 #[derive(Debug, Default)]
 pub struct PrimitiveSegment {
-    /// The primitives, in the order in which macro-tiles look at them where there are many.
+    /// The primitives. If there are many, they are in the order in which macro-tiles read them.
     pub primitives: Vec<Primitive>,
     /// The varyings of their vertices.
     pub varyings: Varyings,
-    /// Which of them each macro-tile has to look at.
+    /// The list of primitives of each macro-tile.
     pub bins: Bins,
 }
 
 impl PrimitiveDraw {
-    /// How many varyings each vertex has.
+    /// The number of varyings of each vertex.
     pub(crate) fn varyings_per_vertex(&self) -> usize {
         let first = self.segments.first();
         first.map_or(0, |segment| segment.varyings.per_vertex)
@@ -57,7 +57,7 @@ impl PrimitiveDraw {
         }
     }
 
-    /// Bytes of host memory that it holds while it waits.
+    /// The bytes of host memory that it holds until it is rendered.
     pub(crate) fn memory_bytes(&self) -> u64 {
         self.segments
             .iter()

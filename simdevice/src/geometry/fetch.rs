@@ -1,4 +1,4 @@
-//! Vertex fetch: attributes of a batch of vertices, from device memory to the inputs of a machine.
+//! Vertex fetch: reads attributes of a batch of vertices from device memory into the inputs of a shader core.
 
 use crate::format::{Format, Numeric};
 use crate::packet::{AttributeStream, Draw};
@@ -7,30 +7,30 @@ use crate::program::vertex::VERTEX_BATCH;
 use isa::Vector;
 use isa::machine::Machine;
 
-/// A span of vertices is read whole where it has at most this many bytes for each vertex wanted.
+/// The most bytes per vertex for which the span of all of a batch's elements is read with one copy.
 const SPAN_BYTES: u64 = 256;
 
 /// An attribute that the program reads.
 struct Attribute<'a> {
     stream: &'a AttributeStream,
-    /// The inputs that take its components: slot and component.
+    /// The inputs that its components are copied to: slot and component.
     inputs: Vec<(u32, usize)>,
 }
 
-/// The inputs of a draw's vertex program.
+/// Reads the inputs of a draw's vertex program.
 pub(super) struct Fetcher<'a> {
     draw: &'a Draw,
-    /// The view that is drawn.
+    /// The number of the view that is drawn.
     view: u32,
     attributes: Vec<Attribute<'a>>,
-    /// Inputs that differ from vertex to vertex and are no attributes.
+    /// The built-in inputs, such as the vertex index.
     numbers: Vec<(u32, VertexInput)>,
     bytes: Vec<u8>,
     packed: Vec<u8>,
 }
 
 impl<'a> Fetcher<'a> {
-    /// Finds out what the draw's program reads, and sets what is the same for all its vertices; `view` is the view's number.
+    /// Finds the inputs of the draw's program, and zeroes those without an attribute. `view` is the view's number.
     pub(super) fn new(draw: &'a Draw, view: u32, machine: &mut Machine) -> Self {
         let mut attributes: Vec<Attribute<'a>> = Vec::new();
         let mut numbers = Vec::new();
@@ -70,7 +70,7 @@ impl<'a> Fetcher<'a> {
         }
     }
 
-    /// Sets the inputs for a batch: vertices by number, and their instances counted from the first.
+    /// Sets the inputs of a batch of vertices, given their numbers and their instances, counted from the draw's first.
     pub(super) fn fetch(&mut self, machine: &mut Machine, vertices: &[i64], instances: &[u32]) {
         let one_instance = instances.windows(2).all(|pair| pair[0] == pair[1]);
         self.set_numbers(machine, vertices, instances);
@@ -135,7 +135,7 @@ impl<'a> Fetcher<'a> {
     }
 }
 
-/// Sets an input's lanes from values; a uniform input takes the first.
+/// Sets the lanes of an input from values. A uniform input takes the first value.
 fn set_lanes<T>(chunks: &mut [Vector], values: &[T], bits: impl Fn(&T) -> u32) {
     if let ([chunk], Some(first)) = (&mut *chunks, values.first()) {
         *chunk = Vector([bits(first); 16]);
@@ -148,7 +148,7 @@ fn set_lanes<T>(chunks: &mut [Vector], values: &[T], bits: impl Fn(&T) -> u32) {
     }
 }
 
-/// Whether components are whole words that need no conversion.
+/// True if components are whole 32-bit words that need no conversion.
 fn is_words(format: Format) -> bool {
     let words = matches!(
         format.numeric(),
@@ -161,15 +161,15 @@ fn is_words(format: Format) -> bool {
             .all(|component| component.bits == 32)
 }
 
-/// Elements in scratch memory.
+/// Elements that were read into host memory.
 struct Source<'a> {
     bytes: &'a [u8],
-    /// Where each element begins, in bytes.
+    /// The byte offset of each element.
     starts: [u32; VERTEX_BATCH],
 }
 
 impl<'a> Source<'a> {
-    /// Reads elements; those that don't lie inside the buffer are zero.
+    /// Reads elements. Elements that lie outside the buffer are zero.
     fn read(stream: &AttributeStream, elements: &[i64], scratch: &'a mut Vec<u8>) -> Self {
         let size = stream.format.texel_size();
         let mut starts = [0; VERTEX_BATCH];
@@ -208,7 +208,7 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// The words of elements of `N` words each, component by component.
+    /// Splits elements of `N` words each into components.
     fn words<const N: usize>(&self, starts: &[u32], words: &mut [[u32; VERTEX_BATCH]; 4]) {
         for (lane, &start) in starts.iter().enumerate() {
             let bytes = &self.bytes[start as usize..][..4 * N];
@@ -218,7 +218,7 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// Copies the elements to lie one after another.
+    /// Copies the elements so that they follow one another.
     fn pack(&self, size: usize, count: usize, packed: &mut Vec<u8>) {
         packed.clear();
         for &start in &self.starts[..count] {
@@ -227,21 +227,21 @@ impl<'a> Source<'a> {
     }
 }
 
-/// As [`AttributeStream::place`]; a negative element lies outside.
+/// The result of [`AttributeStream::place`]; `None` for a negative element, too.
 fn place(stream: &AttributeStream, element: i64, bytes: u64) -> Option<u64> {
     stream.place(u64::try_from(element).ok()?, bytes)
 }
 
-/// The inputs that an attribute's components go to.
+/// The inputs that an attribute's components are copied to.
 struct Out<'a> {
     machine: &'a mut Machine,
     inputs: &'a [(u32, usize)],
-    /// One element is for all lanes.
+    /// True if all lanes take the same element.
     broadcast: bool,
 }
 
 impl Out<'_> {
-    /// Components that are words.
+    /// Sets inputs from components that are words.
     fn words(self, format: Format, source: &Source, count: usize) {
         let one = if format.is_integer() {
             1
@@ -259,7 +259,7 @@ impl Out<'_> {
         }
         for &(slot, component) in self.inputs {
             let chunks = self.machine.input_mut(slot);
-            // The order in memory need not be the order of components.
+            // The order in memory may differ from the order of components.
             let wanted = [
                 crate::format::Channel::R,
                 crate::format::Channel::G,
@@ -281,7 +281,7 @@ impl Out<'_> {
         }
     }
 
-    /// Components that have to be decoded from packed elements.
+    /// Sets inputs from packed elements that must be decoded.
     fn decoded(self, format: Format, packed: &[u8], count: usize) {
         let mut texels = [[0.0; 4]; VERTEX_BATCH];
         let texels = &mut texels[..count];

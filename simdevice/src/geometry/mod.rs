@@ -1,11 +1,11 @@
-//! The front end of points, lines and triangles: vertices are fetched and shaded, and primitives assembled, clipped,
-//! set up and binned.
+//! The front end of points, lines and triangles: fetches and shades vertices, then assembles, clips, sets up and bins
+//! primitives.
 //!
-//! A draw is cut into segments of consecutive primitives, whatever the number of workers. Each worker takes a segment
-//! through all stages, each stage in a module: [`vertex_reuse`] (which distinct vertices it names), [`fetch`] (their
-//! attributes), [`shade`] (the vertex program and the [`viewport`]), [`assemble`] and [`setup`] (primitives, [`clip`]ped,
-//! culled, with [`depth_bias`]); [`bins`] sorts what all segments made by macro-tile. Vertices on the border of two segments
-//! are shaded in both.
+//! A draw is divided into segments of consecutive primitives, independent of the number of workers. A worker takes a
+//! segment through all stages, each in a module: [`vertex_reuse`] (the distinct vertices), [`fetch`] (their
+//! attributes), [`shade`] (the vertex program and the [`viewport`]), [`assemble`] and [`setup`] (primitives,
+//! [`clip`]ped, culled, with [`depth_bias`]); [`bins`] lists the primitives of each macro-tile. Vertices on the border
+//! of two segments are shaded in both.
 
 mod assemble;
 mod bins;
@@ -49,26 +49,27 @@ use std::time::Instant;
 use vertex_reuse::{RestartRun, VertexReuse, runs};
 use viewport::Transform;
 
-/// Primitives of a segment.
+/// The number of primitives in a segment.
 const SEGMENT: u64 = 2048;
 
-/// Segments of a part: what is set up before any of it is rendered.
+/// The number of segments in a part. A part is set up before any of it is rendered.
 const PART_SEGMENTS: u64 = 512;
 
-/// What is drawn to.
+/// The target of a draw.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Surface {
-    /// The pixels that may be touched, none left of or above the framebuffer's corner.
+    /// The pixels that may be touched. None is left of or above the framebuffer's corner.
     pub area: Rect,
-    /// How many layers there are.
+    /// The number of layers.
     pub layers: u32,
-    /// The layer that all is drawn to, which the vertex program knows as its view; without it the program says the layer.
+    /// The layer to which everything is drawn, which is the view index of the vertex program. Without it, the program
+    /// writes the layer.
     pub view: Option<u32>,
     /// The depth attachment's format.
     pub depth: Option<Format>,
 }
 
-/// A draw on its way to the rasterizer, part by part.
+/// The stages of a draw before rasterization, run part by part.
 pub(crate) struct FrontEnd<'a> {
     draw: &'a Draw,
     runtime: &'a Runtime,
@@ -77,17 +78,17 @@ pub(crate) struct FrontEnd<'a> {
     runs: Vec<RestartRun>,
     transforms: Vec<Transform>,
     regions: Vec<Rect>,
-    /// Primitives of an instance.
+    /// The number of primitives of an instance.
     primitives: u64,
-    /// Whether a segment may have primitives of several instances.
+    /// True if a segment may have primitives of several instances.
     mixes_instances: bool,
     segments: u64,
-    /// The first segment that was not taken.
+    /// The first segment that was not processed yet.
     next: u64,
 }
 
 impl<'a> FrontEnd<'a> {
-    /// Begins a draw.
+    /// Begins a draw: finds its runs, viewports and scissors.
     pub(crate) fn new(
         draw: &'a Draw,
         surface: Surface,
@@ -138,10 +139,7 @@ impl<'a> FrontEnd<'a> {
         }
     }
 
-    /// Does all of the next part that comes before tiles; `None` when there are no more.
-    ///
-    /// # Errors
-    /// [`Stopped`] if the vertex program ran for too long.
+    /// Processes the next part up to binning; `None` if there are no more.
     pub(crate) fn next_segments(
         &mut self,
         counters: &mut Counters,
@@ -163,7 +161,7 @@ impl<'a> FrontEnd<'a> {
         part.map(Some)
     }
 
-    /// Takes segments through all stages, each by whichever worker is free.
+    /// Processes segments on all workers. The result is in the order of segments.
     fn process(
         &self,
         range: std::ops::Range<u64>,
@@ -203,7 +201,7 @@ impl<'a> FrontEnd<'a> {
         Grid::new(self.surface.area, self.runtime.config().macro_tile_size)
     }
 
-    /// Calls `each` with the runs, instances and primitives (first and end) of a segment, in order.
+    /// Calls `each` with the run, instance, and first and end primitive of each piece of a segment, in order.
     fn segment_ranges(&self, segment: u64, mut each: impl FnMut(&RestartRun, u32, u32, u32)) {
         let total = self
             .primitives
@@ -230,8 +228,8 @@ impl<'a> FrontEnd<'a> {
     }
 }
 
-/// Whether vertices of different instances may share a batch: no input that depends on the instance is the same for
-/// all of a batch.
+/// True if vertices of different instances may share a batch: no input that depends on the instance is uniform in a
+/// batch.
 fn mixes_instances(draw: &Draw) -> bool {
     let depends = |input: VertexInput| match input {
         VertexInput::InstanceIndex => true,
@@ -247,12 +245,12 @@ fn mixes_instances(draw: &Draw) -> bool {
         .any(|&(_, rate, input)| rate == Rate::Uniform && depends(input))
 }
 
-/// Whether primitives may become points.
+/// True if primitives may become points.
 fn draws_points(state: &DrawState) -> bool {
     corner_count(state.topology) == 1 || state.polygon_mode == PolygonMode::Point
 }
 
-/// What one worker takes segments through.
+/// The state of one worker that processes segments.
 struct Worker<'a> {
     front: &'a FrontEnd<'a>,
     setup: &'a Setup<'a>,
@@ -262,7 +260,7 @@ struct Worker<'a> {
     numbers: Vec<u32>,
     output: Output,
     counters: Counters,
-    /// What became of the segments that left anything, with their numbers.
+    /// The segments that have primitives, with their numbers.
     done: Vec<(u64, PrimitiveSegment)>,
 }
 
@@ -300,7 +298,7 @@ impl<'a> Worker<'a> {
         }
     }
 
-    /// Takes a segment through all stages.
+    /// Processes a segment.
     fn run_segment(&mut self, segment: u64) -> Result<(), Stopped> {
         let (front, reuse) = (self.front, &mut self.reuse);
         reuse.clear();
@@ -329,7 +327,7 @@ impl<'a> Worker<'a> {
         Ok(())
     }
 
-    /// What was made of a segment, in memory of its size, sorted by macro-tile.
+    /// The result of the last segment, copied to memory of its size, with lists by macro-tile.
     fn keep(&mut self) -> PrimitiveSegment {
         let (output, setup) = (&self.output, self.setup);
         let started = Instant::now();

@@ -1,16 +1,17 @@
-//! The order in which a segment's primitives and vertices lie in memory: that in which macro-tiles look at them. A tile then
-//! reads memory from end to end, where else it would wait for each of many small primitives.
+//! The order of a segment's primitives and vertices in memory: that in which macro-tiles read them. A tile then reads
+//! memory sequentially, instead of waiting for each of many small primitives.
 
 use super::bins::Bins;
 use super::primitive::Primitive;
 use super::setup::{NONE, Output};
 use devmem::host;
 
-/// A segment of fewer primitives is left as it is. The front end's own tests look at primitives in the order of the draw.
+/// The least number of primitives in a segment that is reordered. The front end's own tests expect primitives in the
+/// order of the draw.
 pub(super) const FEW: usize = if cfg!(test) { usize::MAX } else { 128 };
 
-/// The primitives and the varyings of a segment, in the order of its bins, which are made to name them, unless there are less
-/// than `few`.
+/// The primitives and the varyings of a segment, in the order of its bins, whose entries are renumbered. A segment of
+/// fewer than `few` primitives is not reordered.
 pub(super) fn in_order(
     output: &Output,
     per_vertex: usize,
@@ -48,11 +49,11 @@ pub(super) fn in_order(
     (primitives, ordered.varyings)
 }
 
-/// Vertices in the order in which they are asked for.
+/// Vertices in the order of their first use.
 struct Ordered<'a> {
     output: &'a Output,
     per_vertex: usize,
-    /// By old number: the new one, or [`NONE`].
+    /// The new number of each old one, or [`NONE`].
     numbers: Vec<u32>,
     vertices: u32,
     varyings: Vec<u32>,
@@ -80,7 +81,7 @@ mod tests {
     use crate::geometry::{PrimitiveKind, Varyings};
     use crate::state::Rect;
 
-    /// A primitive of three vertices, which are given.
+    /// A primitive with these three vertices.
     fn primitive(id: u32, vertices: [u32; 3]) -> Primitive {
         Primitive {
             corners: [[0; 2]; 3],
@@ -109,7 +110,7 @@ mod tests {
                     .collect(),
                 ..Output::default()
             };
-            // Some in several tiles, some in none.
+            // Primitives are in up to three tiles; some are in none.
             for id in 0..count {
                 for tile in 0..id % 4 {
                     output.pairs.push(((id * 13 + tile * 5) % 16, id));

@@ -1,5 +1,5 @@
-//! Vertex shading alone: what the vertex program of a draw of points writes, for those who make something other than
-//! points of it.
+//! Vertex shading alone: runs the vertex program of a draw of points and returns its outputs. Gaussian draws use it to
+//! project Gaussians.
 
 use super::fetch::Fetcher;
 use super::shade::{Shaded, Shader};
@@ -21,7 +21,7 @@ pub(crate) struct PointShader<'a> {
 }
 
 impl<'a> PointShader<'a> {
-    /// Makes a machine ready, for view number `view`. `cancel` stops it.
+    /// Prepares a machine for view number `view`. Setting `cancel` stops it.
     pub(crate) fn new(
         draw: &'a Draw,
         view: u32,
@@ -51,7 +51,7 @@ impl<'a> PointShader<'a> {
         }
     }
 
-    /// Whether the program writes a varying.
+    /// True if the program writes a varying.
     pub(crate) fn writes(&self, varying: u32) -> bool {
         let varyings = &self.shader.outputs.varyings;
         varyings.get(varying as usize).is_some_and(Option::is_some)

@@ -1,15 +1,15 @@
 //! Primitives as they are rasterized.
 
-/// The varyings of vertices, those that clipping made included: 32-bit scalars, vertex by vertex.
+/// The varyings of vertices, including those that clipping made: 32-bit scalars, vertex by vertex.
 #[derive(Debug, Default)]
 pub struct Varyings {
-    /// All of them.
+    /// The values of all vertices.
     pub values: Vec<u32>,
-    /// How many each vertex has.
+    /// The number of varyings of each vertex.
     pub per_vertex: usize,
 }
 
-/// What a primitive was before it became a convex polygon.
+/// The kind of primitive from which a convex polygon was made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum PrimitiveKind {
     /// A triangle: corners 0 to 2.
@@ -20,33 +20,33 @@ pub enum PrimitiveKind {
     Point,
 }
 
-/// A convex polygon to be rasterized: a triangle, or the parallelogram whose fourth corner is c0 + c2 - c1. Whatever
-/// varies over it is affine in the framebuffer (after division by w where it is perspective-correct), and given at
-/// corners 0 to 2, or where those were before snapping.
+/// A convex polygon to be rasterized: a triangle, or the parallelogram whose fourth corner is c0 + c2 - c1. Everything
+/// interpolated over it is affine in the framebuffer (after division by w for perspective-correct varyings). The values
+/// are given at the vertices of corners 0 to 2, at their positions before snapping.
 #[derive(Clone, Copy, Debug)]
 pub struct Primitive {
     /// Framebuffer positions in 1/256 pixels, x and y down; ordered so that the signed area
     /// (c1 - c0) x (c2 - c0) is positive, whichever way the primitive faces.
     pub corners: [[i32; 2]; 3],
-    /// Where the vertices were before snapping, from the corners, in 2^-24 pixels. Whatever varies has its values
-    /// there.
+    /// The positions of the vertices before snapping, relative to the corners, in 2^-24 pixels. Interpolated values
+    /// apply there.
     pub offsets: [[i16; 2]; 3],
     /// Depth at the vertices, viewport-mapped, with depth bias, not clamped.
     pub depth: [f32; 3],
     /// 1 / w at the vertices.
     pub inverse_w: [f32; 3],
-    /// The vertices at the corners, in [`PrimitiveSegment::varyings`].
+    /// The vertices at the corners, as numbers in [`PrimitiveSegment::varyings`](super::PrimitiveSegment::varyings).
     pub vertices: [u32; 3],
-    /// The vertex that flat varyings are taken from.
+    /// The vertex whose values flat varyings take.
     pub provoking: u32,
-    /// Its number within the instance.
+    /// The number of its primitive within the instance.
     pub id: u32,
-    /// What it is.
+    /// The kind of primitive that it was made from.
     pub kind: PrimitiveKind,
-    /// Whether it faces the front; points and lines do.
+    /// True if it faces the front, as all points and lines do.
     pub front: bool,
-    /// The viewport, which selects the scissor and the range that depth is clamped to.
+    /// The viewport, which selects the scissor and the range to which depth is clamped.
     pub viewport: u8,
-    /// The layer that it is drawn to.
+    /// The layer to which it is drawn.
     pub layer: u16,
 }

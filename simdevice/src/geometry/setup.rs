@@ -1,4 +1,4 @@
-//! Set-up: assembled primitives are clipped, culled and become what the rasterizer takes.
+//! Primitive set-up: clips and culls assembled primitives, and converts them to the rasterizer's form.
 
 use super::assemble::{corner_count, corners};
 use super::bins::{Grid, Pair};
@@ -18,22 +18,22 @@ use crate::simd::{both, three};
 use crate::state::{DrawState, PolygonMode, Rect};
 use devmem::host;
 
-/// What a segment of primitives became. Vertices and primitives are numbered from 0.
+/// The result of a segment. Vertices and primitives are numbered from 0.
 #[derive(Debug, Default)]
 pub(super) struct Output {
     pub primitives: Vec<Primitive>,
     pub varyings: Vec<u32>,
     pub pairs: Vec<Pair>,
-    /// Vertices in `varyings`, even if they have none.
+    /// The number of vertices, even if they have no varyings.
     pub vertices: u32,
-    /// Primitives that were assembled.
+    /// The number of primitives that were assembled.
     pub assembled: u64,
-    /// Primitives that clipping left.
+    /// The number of primitives that clipping produced.
     pub clipped: u64,
 }
 
 impl Output {
-    /// Forgets an earlier segment, but keeps its memory.
+    /// Removes the content of an earlier segment, but keeps the memory.
     pub(super) fn clear(&mut self) {
         self.primitives.clear();
         self.varyings.clear();
@@ -42,17 +42,17 @@ impl Output {
     }
 }
 
-/// What set-up needs to know of a draw.
+/// The inputs of set-up that a whole draw shares.
 pub(super) struct Setup<'a> {
     pub state: &'a DrawState,
     pub outputs: &'a VertexOutputs,
-    /// By viewport.
+    /// The transform of each viewport.
     pub transforms: &'a [Transform],
     /// The pixels that may be touched, by viewport.
     pub regions: &'a [Rect],
     pub grid: Grid,
     pub layers: u32,
-    /// The layer that all is drawn to, whatever the program says.
+    /// The layer to which everything is drawn, if the program does not choose it.
     pub view: Option<u32>,
     pub depth_unit: DepthUnit,
 }
@@ -61,21 +61,21 @@ pub(super) struct Setup<'a> {
 pub(super) struct SegmentSetup<'a> {
     pub(super) setup: &'a Setup<'a>,
     pub(super) shaded: &'a Shaded,
-    /// By slot: the vertex's number in the output, or [`NONE`].
+    /// The number in the output of the vertex in each slot, or [`NONE`].
     pub(super) numbers: &'a mut Vec<u32>,
     pub(super) out: &'a mut Output,
 }
 
-/// A vertex that has no number yet.
+/// Marks a vertex that has no number yet.
 pub(super) const NONE: u32 = u32::MAX;
 
-/// The primitive being set up.
+/// A primitive during set-up.
 #[derive(Clone, Copy)]
 pub(super) struct AssembledPrimitive {
     pub id: u32,
-    /// Slots of its corners.
+    /// The slots of its corners.
     pub slots: [u32; 3],
-    /// The provoking vertex's slot.
+    /// The slot of the provoking vertex.
     pub provoking: u32,
     pub viewport: u8,
     pub layer: u16,
@@ -93,12 +93,12 @@ pub(super) struct CornerVertex<'p> {
 pub(super) enum Origin {
     /// A shaded vertex, by slot.
     Slot(u32),
-    /// A mixture of the primitive's corners, already in the output.
+    /// A vertex that clipping made, with its number in the output.
     New { number: u32 },
 }
 
 impl<'a> SegmentSetup<'a> {
-    /// `out` must be clear.
+    /// The set-up of a segment. `out` must be empty.
     pub(super) fn new(
         setup: &'a Setup<'a>,
         shaded: &'a Shaded,
@@ -149,8 +149,8 @@ impl<'a> SegmentSetup<'a> {
             .unwrap_or(&NO_OPTIONAL_OUTPUTS)
     }
 
-    /// The provoking vertex says which layer and viewport a primitive is drawn to; what doesn't exist is the last
-    /// layer, or the first viewport. A view is its own layer.
+    /// Sets the layer and viewport of a primitive, which the provoking vertex selects. A layer that does not exist
+    /// becomes the last one, and a viewport that does not exist the first. A view is drawn to its own layer.
     fn choose_target(&self, current: &mut AssembledPrimitive) {
         current.layer = self.setup.view.map_or(0, |view| view as u16);
         if self.shaded.optional.is_empty() {
@@ -170,7 +170,7 @@ impl<'a> SegmentSetup<'a> {
         &self.setup.transforms[usize::from(current.viewport)]
     }
 
-    /// A shaded vertex as the primitive's viewport, which is not the first, has it.
+    /// A shaded vertex with the projection of the primitive's viewport, which is not the first.
     fn projected_again(&self, current: &AssembledPrimitive, slot: u32) -> Vertex {
         let mut vertex = self.shaded.vertices[slot as usize];
         let transform = self.transform(current);
@@ -180,8 +180,8 @@ impl<'a> SegmentSetup<'a> {
         vertex
     }
 
-    /// Calls `then` with the primitive's vertices as its viewport has them. They are not copied: this is where set-up
-    /// spends its time.
+    /// Calls `then` with the primitive's vertices, projected by its viewport. They are not copied, because most of the
+    /// time of set-up is spent here.
     #[inline(always)]
     fn with_vertices<const N: usize>(
         &mut self,
@@ -215,7 +215,7 @@ impl<'a> SegmentSetup<'a> {
 
     fn line(&mut self, current: &mut AssembledPrimitive, ends: [&Vertex; 2]) {
         let (all, any) = (ends[0].code & ends[1].code, ends[0].code | ends[1].code);
-        // A wide line may reach into the view volume from beyond its side.
+        // A wide line may extend into the view volume from outside of its sides.
         if all & code::OUTSIDE & !code::ANY_SIDE != 0 || any & code::INVALID != 0 {
             return;
         }
@@ -296,7 +296,7 @@ impl<'a> SegmentSetup<'a> {
                 None => transform.project(narrow(vertex)),
             };
         }
-        // Whether it is seen is decided before anything is made for it.
+        // Visibility is decided before vertices are made.
         let fan = |place: usize| cross([0, place, place + 1].map(|i: usize| projected[i].snapped));
         let area: i64 = (1..clipped.len() - 1).map(fan).sum();
         let fills = self.setup.state.polygon_mode == PolygonMode::Fill;
@@ -324,15 +324,15 @@ impl<'a> SegmentSetup<'a> {
         for pair in places[1..].windows(2) {
             let corners = [places[0], pair[0], pair[1]];
             let part = cross(corners.map(|place| place.projected.snapped));
-            // What snapping has turned over lies within its neighbours.
+            // A triangle of the fan that snapping has turned over lies within its neighbours.
             if part.signum() == area.signum() {
                 self.push_triangle(current, corners, part);
             }
         }
     }
 
-    /// Finds out which way a polygon of that area faces, and whether such polygons are drawn. y points down, so that
-    /// a positive area is clockwise. One without area faces the back.
+    /// Sets the facing of a polygon of this area, and returns true if such polygons are drawn. y points down, so that a
+    /// positive area is clockwise. A polygon without area faces the back.
     fn faces(&self, current: &mut AssembledPrimitive, area: i64) -> bool {
         let state = self.setup.state;
         current.front = area != 0 && (area > 0) == state.front_clockwise;
@@ -343,7 +343,7 @@ impl<'a> SegmentSetup<'a> {
         }
     }
 
-    /// Draws a polygon's edges, or their first vertices, where they belong to its outline.
+    /// Draws the edges of a polygon that belong to its outline, or the first vertex of each.
     fn outline(
         &mut self,
         current: &AssembledPrimitive,
@@ -376,7 +376,7 @@ impl<'a> SegmentSetup<'a> {
     }
 }
 
-/// A position as vertices have it.
+/// The position of a clipped vertex in binary32.
 pub(super) fn narrow(vertex: &ClipVertex) -> [f32; 4] {
     vertex.position.map(|coordinate| coordinate as f32)
 }
@@ -388,21 +388,21 @@ pub(super) fn cross([a, b, c]: [[i32; 2]; 3]) -> i64 {
     along(b, 0) * along(c, 1) - along(b, 1) * along(c, 0)
 }
 
-/// Offsets of what snapping has not moved.
+/// The offsets of vertices that snapping has not moved.
 const UNMOVED: [[i16; 2]; 3] = [[0; 2]; 3];
 
-/// The units of [`Primitive::offsets`] in a pixel.
+/// The number of units of [`Primitive::offsets`] in a pixel.
 const OFFSET_UNITS: f64 = 16_777_216.0;
 
-/// A primitive's outline.
+/// The geometry of a primitive.
 struct Shape {
     kind: PrimitiveKind,
     corners: [[i32; 2]; 3],
-    /// As [`Primitive::offsets`].
+    /// The positions of the vertices relative to the corners: see [`Primitive::offsets`].
     offsets: [[i16; 2]; 3],
-    /// At the vertices.
+    /// The depth at the vertices.
     depth: [f32; 3],
-    /// What it may cover.
+    /// The pixels that it may cover.
     pixels: Pixels,
 }
 
@@ -500,10 +500,11 @@ impl SegmentSetup<'_> {
         }
     }
 
-    /// The pixels that may have a sample within the bounds of these corners, where they may be drawn to.
+    /// The pixels that may have a sample within the bounds of these corners and may be touched; `None` if there are
+    /// none.
     #[inline(always)]
     fn pixels(&self, current: &AssembledPrimitive, corners: &[[i32; 2]]) -> Option<Pixels> {
-        // Where samples lie within a pixel: the least and the greatest coordinate.
+        // The least and the greatest coordinate of a sample within a pixel.
         let (low, high) = if self.setup.state.samples == 1 {
             (128, 128)
         } else {
@@ -516,7 +517,7 @@ impl SegmentSetup<'_> {
                 least = least.min(corner[axis]);
                 greatest = greatest.max(corner[axis]);
             }
-            // Right and bottom edges cover nothing.
+            // Samples on right and bottom edges are not covered.
             let first = (least - high + ONE - 1) >> 8;
             let last = (greatest - 1 - low) >> 8;
             let end = i64::from(start) + i64::from(length) - 1;
@@ -558,7 +559,7 @@ impl SegmentSetup<'_> {
         host::push(&mut self.out.primitives, primitive);
     }
 
-    /// The number of a vertex in the output, which it enters when it is first asked for.
+    /// The number of a vertex in the output. A vertex is added at its first use.
     #[inline(always)]
     fn number(&mut self, origin: Origin) -> u32 {
         let slot = match origin {
@@ -575,7 +576,7 @@ impl SegmentSetup<'_> {
         self.numbers[slot]
     }
 
-    /// Makes a vertex that clipping found, and puts its varyings into the output.
+    /// Adds a vertex that clipping made, with its interpolated varyings, to the output.
     pub(super) fn new_vertex(
         &mut self,
         current: &AssembledPrimitive,
@@ -584,7 +585,7 @@ impl SegmentSetup<'_> {
         let number = self.out.vertices;
         self.out.vertices += 1;
         let weights = vertex.weights;
-        // Weights in the framebuffer are those in clip space times w, made to add up to 1 again.
+        // Weights in the framebuffer are those in clip space times w, normalized to a sum of 1.
         let mut linear = weights;
         for (weight, slot) in linear.iter_mut().zip(current.slots) {
             *weight *= f64::from(self.shaded.vertices[slot as usize].position[3]);
@@ -598,7 +599,7 @@ impl SegmentSetup<'_> {
         for (varying, interpolation) in interpolation.iter().enumerate() {
             let mix = |weights: [f64; 3]| {
                 let part = |corner: usize| {
-                    // A corner that has no part in it must not spoil it by being infinite.
+                    // An infinite value at a corner of weight zero must not make the sum NaN.
                     if weights[corner] == 0.0 {
                         return 0.0;
                     }
@@ -618,8 +619,8 @@ impl SegmentSetup<'_> {
     }
 }
 
-/// Turned so that no vertex is nearer than the first. What varies is found as its value there and what others add: a far
-/// vertex may have a value so great that too little is left of the sum near the eye.
+/// The vertices rotated so that none is nearer than the first. Interpolation adds differences to the first vertex's
+/// value. A far vertex may have so large a value that the sum would lose precision near the eye.
 #[inline(always)]
 fn nearest_first([a, b, c]: [CornerVertex<'_>; 3]) -> [CornerVertex<'_>; 3] {
     let [wa, wb, wc] = three([a, b, c], |place| place.projected.inverse_w);
@@ -632,7 +633,7 @@ fn nearest_first([a, b, c]: [CornerVertex<'_>; 3]) -> [CornerVertex<'_>; 3] {
     }
 }
 
-/// Where a triangle's vertices were before snapping, from its corners.
+/// The positions of a triangle's vertices before snapping, relative to its corners.
 #[inline(always)]
 fn offsets(places: [CornerVertex; 3]) -> [[i16; 2]; 3] {
     let mut offsets = UNMOVED;
@@ -648,8 +649,8 @@ fn offsets(places: [CornerVertex; 3]) -> [[i16; 2]; 3] {
     offsets
 }
 
-/// Whether a triangle, whose bounds hold at most four pixel centres, covers none of them. Larger ones aren't looked
-/// at.
+/// True if a triangle whose bounds hold at most four pixel centres covers none of them. Always false for larger
+/// triangles, which are not tested.
 #[inline(always)]
 fn covers_nothing(corners: &[[i32; 2]; 3], pixels: Pixels) -> bool {
     let span = |[first, last]: [i32; 2]| last - first;

@@ -1,4 +1,4 @@
-//! Vertex shading: runs the vertex program on the vertices of a segment, and projects what it wrote.
+//! Vertex shading: runs the vertex program on the vertices of a segment, and projects the positions.
 
 use super::fetch::Fetcher;
 use super::vertex_reuse::VertexReuse;
@@ -16,14 +16,14 @@ use isa::resources::Resources;
 /// A vertex after the vertex program and the first viewport's transform.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Vertex {
-    /// In clip space.
+    /// The position in clip space.
     pub position: [f32; 4],
     pub projected: WindowVertex,
-    /// See [`code`].
+    /// The clip code; see [`code`].
     pub code: u32,
 }
 
-/// What only some vertex programs write.
+/// The outputs that only some vertex programs write.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct OptionalOutputs {
     pub point_size: f32,
@@ -33,7 +33,7 @@ pub(super) struct OptionalOutputs {
     pub cull: [f32; MAX_CLIP_CULL_DISTANCES],
 }
 
-/// The optional outputs where nothing is written.
+/// The optional outputs of a program that writes none.
 pub(super) const NO_OPTIONAL_OUTPUTS: OptionalOutputs = OptionalOutputs {
     point_size: 1.0,
     layer: 0,
@@ -46,18 +46,18 @@ pub(super) const NO_OPTIONAL_OUTPUTS: OptionalOutputs = OptionalOutputs {
 #[derive(Debug, Default)]
 pub(super) struct Shaded {
     pub vertices: Vec<Vertex>,
-    /// Empty if no vertex has any.
+    /// The optional outputs; empty if they are not needed.
     pub optional: Vec<OptionalOutputs>,
-    /// Vertex by vertex.
+    /// The varyings, vertex by vertex.
     pub varyings: Vec<u32>,
 }
 
-/// Where batches run.
+/// Runs the vertex program on batches.
 pub(super) struct Shader<'a> {
     pub machine: PooledMachine<'a>,
     pub fetcher: Fetcher<'a>,
     pub outputs: &'a VertexOutputs,
-    /// Whether more than positions and varyings is looked at.
+    /// True if outputs other than positions and varyings are needed.
     pub takes_optional: bool,
     pub level: Level,
     pub transform: Transform,
@@ -92,7 +92,7 @@ impl Shader<'_> {
         Ok(())
     }
 
-    /// Appends a batch's outputs.
+    /// Appends a batch's outputs to `shaded`.
     fn take(&self, count: usize, shaded: &mut Shaded) {
         let outputs = self.outputs;
         let first = shaded.vertices.len();
@@ -183,7 +183,7 @@ impl Shader<'_> {
     }
 }
 
-/// The part of a vertex's code that its distances make.
+/// The bits of a vertex's clip code that depend on its clip and cull distances.
 fn distance_code(optional: &OptionalOutputs) -> u32 {
     let mut bits = 0;
     for (index, distance) in optional.clip.iter().enumerate() {
@@ -202,7 +202,7 @@ fn distance_code(optional: &OptionalOutputs) -> u32 {
     bits
 }
 
-/// Calls `set` with each of `items` and its lane of an output, if there is such an output.
+/// Calls `set` with each item and its lane of an output, if there is such an output.
 fn for_lanes<T>(machine: &Machine, slot: Option<u32>, items: &mut [T], set: impl Fn(&mut T, u32)) {
     let Some(slot) = slot else {
         return;

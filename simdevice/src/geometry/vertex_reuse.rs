@@ -1,26 +1,26 @@
-//! Which vertices a draw names: consecutive ones or indices, runs between primitive restarts, and the distinct
-//! vertices of a segment of primitives.
+//! The vertices of a draw: consecutive numbers or indices, runs between primitive restarts, and the distinct vertices
+//! of a segment of primitives.
 
 use super::assemble::{places, primitive_count, uses_pivot};
 use crate::packet::Draw;
 use crate::state::Topology;
 use devmem::host;
 
-/// Vertices that no restart interrupts.
+/// A sequence of vertices without a restart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct RestartRun {
-    /// The place of its first vertex among the draw's.
+    /// The place of its first vertex among the draw's vertices.
     pub start: u32,
-    /// How many primitives come before it in the instance.
+    /// The number of primitives before it in the instance.
     pub primitives_before: u32,
-    /// How many primitives it has.
+    /// The number of its primitives.
     pub primitives: u32,
 }
 
-/// Indices that are looked at for restarts at a time.
+/// The number of indices that are searched for restarts at a time.
 const SCAN: u32 = 1 << 16;
 
-/// The runs of a draw that have primitives, and how many vertices all runs have.
+/// The runs of a draw that have primitives, and the number of vertices of all runs.
 pub(super) fn runs(draw: &Draw) -> (Vec<RestartRun>, u64) {
     let topology = draw.state.topology;
     let mut gathered = Runs {
@@ -33,7 +33,7 @@ pub(super) fn runs(draw: &Draw) -> (Vec<RestartRun>, u64) {
         Some(stream) if draw.state.primitive_restart => {
             let restart = stream.restart_index();
             let (mut start, mut indices) = (0, Vec::new());
-            // Indices outside the buffer read as zero, so that they restart nothing.
+            // Indices outside the buffer read as zero, so that they never restart.
             let known = stream.len().saturating_sub(u64::from(draw.first));
             let known = known.min(u64::from(draw.count)) as u32;
             for block in (0..known).step_by(SCAN as usize) {
@@ -77,41 +77,41 @@ impl Runs {
     }
 }
 
-/// Primitives of one run and instance.
+/// Consecutive primitives of one run and instance.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Piece {
-    /// The run's primitives before this one belong to others.
+    /// The number in the run of its first primitive.
     pub first: u32,
-    /// The end of its primitives in the run.
+    /// The number in the run after its last primitive.
     pub end: u32,
-    /// How many primitives come before the run.
+    /// The number of primitives before the run.
     pub primitives_before: u32,
-    /// The place in the run of the first of `elements`.
+    /// The place in the run of its first element.
     base: u32,
-    /// Where its elements begin in [`VertexReuse::slots`].
+    /// The index of its first element in [`VertexReuse::slots`].
     elements: usize,
     /// The first of its slots.
     first_vertex: usize,
-    /// The slot of the run's first vertex, where all primitives use it.
+    /// The slot of the run's first vertex, if all primitives use it.
     pivot: u32,
 }
 
-/// The distinct vertices of a segment, each in a slot, and where primitives find them.
+/// The distinct vertices of a segment, each in a slot, and the slots of its primitives.
 #[derive(Debug, Default)]
 pub(super) struct VertexReuse {
     pub pieces: Vec<Piece>,
-    /// By slot: the vertex's number, which an offset may have made negative.
+    /// The vertex number of each slot. An offset may make it negative.
     pub vertices: Vec<i64>,
-    /// By slot: the instance, counted from the draw's first.
+    /// The instance of each slot, counted from the draw's first.
     pub instances: Vec<u32>,
-    /// The slot of each place of each piece, in order.
+    /// The slot of each element of each piece, in order.
     slots: Vec<u32>,
     indices: Vec<u32>,
     table: Vec<u32>,
 }
 
 impl VertexReuse {
-    /// Forgets the previous segment.
+    /// Removes the previous segment.
     pub(super) fn clear(&mut self) {
         self.pieces.clear();
         self.vertices.clear();
@@ -119,7 +119,7 @@ impl VertexReuse {
         self.slots.clear();
     }
 
-    /// How many primitives the segment has.
+    /// The number of primitives of the segment.
     pub(super) fn primitives(&self) -> u64 {
         let pieces = self.pieces.iter();
         pieces.map(|piece| u64::from(piece.end - piece.first)).sum()
@@ -139,7 +139,7 @@ impl VertexReuse {
         let place = |place: u32| u64::from(draw.first) + u64::from(run.start) + u64::from(place);
         let pivot = uses_pivot(topology);
         let (elements, first_vertex) = (self.slots.len(), self.vertices.len());
-        // An instance that repeats the piece before it repeats its slots.
+        // If an instance repeats the piece before it, the slots are copied.
         if let Some(&before) = self.pieces.last()
             && (before.first, before.end) == (first, end)
             && before.primitives_before == run.primitives_before
@@ -190,10 +190,10 @@ impl VertexReuse {
         });
     }
 
-    /// Adds the primitives of `before`, the last piece, for another instance.
+    /// Adds the primitives of `before`, the last piece, again for another instance.
     fn repeat(&mut self, before: Piece, instance: u32) {
         let elements = self.slots.len();
-        // Its vertices are the last ones.
+        // The vertices of `before` are the last ones.
         let first = before.first_vertex;
         let shift = (self.vertices.len() - first) as u32;
         self.slots.extend_from_within(before.elements..);
@@ -210,7 +210,7 @@ impl VertexReuse {
         });
     }
 
-    /// Gives each distinct index a slot, and appends the slot of every index.
+    /// Assigns a slot to each distinct index, and appends the slot of every index.
     fn place_indices(&mut self, indices: &[u32], offset: i64) {
         let (mut least, mut greatest) = (u32::MAX, 0);
         for &index in indices {
@@ -225,7 +225,8 @@ impl VertexReuse {
         }
     }
 
-    /// By a table of all indices in the range. Slots ascend with indices, so that memory is read in order.
+    /// Assigns slots with a table of all indices in the range. Slots ascend with indices, so that memory is read in
+    /// order.
     fn place_dense(&mut self, indices: &[u32], least: u32, range: usize, offset: i64) {
         self.table.clear();
         host::resize(&mut self.table, range, 0);
@@ -243,7 +244,7 @@ impl VertexReuse {
         self.slots.extend(slots);
     }
 
-    /// By a hash table with open addressing. Slots are in the order of first use.
+    /// Assigns slots with a hash table with open addressing, in the order of first use.
     fn place_sparse(&mut self, indices: &[u32], offset: i64) {
         const FREE: u32 = u32::MAX;
         let bits = (2 * indices.len())

@@ -1,63 +1,63 @@
-//! From clip space to the framebuffer: the viewport transform, snapping to 1/256 pixels, and clip codes.
+//! The viewport transform from clip space to the framebuffer, snapping to 1/256 pixels, and clip codes.
 
 use crate::state::{Rect, Viewport};
 
-/// Sub-pixel units of a pixel.
+/// The number of sub-pixel units in a pixel.
 pub(super) const ONE: i32 = 256;
 
-/// Primitives are clipped in x and y only where they reach farther than this from the framebuffer's corner, in
-/// pixels. Up to here binary32 resolves 1/256 pixel, coordinates have 24 bits, and edge functions some 50.
+/// The distance of the guard band from the framebuffer's corner, in pixels. Primitives are clipped in x and y only
+/// beyond it. Up to this distance binary32 resolves 1/256 pixel, coordinates have 24 bits, and edge functions about 50.
 pub(super) const GUARD: f64 = 32_768.0;
 
-/// The least w that is divided by: its reciprocal is finite.
+/// The least w for a division: its reciprocal is finite.
 pub(super) const LEAST_W: f32 = f32::from_bits((127 - 120) << 23);
 
-/// Why a vertex needs clipping, bit by bit. A primitive that shares a bit of [`code::OUTSIDE`] among all its
-/// vertices is invisible; one whose vertices have no bit of [`code::CLIP`] need not be clipped.
+/// The bits of a clip code, which say against what a vertex must be clipped. A primitive whose vertices all share a bit
+/// of [`code::OUTSIDE`] is invisible. A primitive whose vertices have no bit of [`code::CLIP`] need not be clipped.
 pub(super) mod code {
     /// Beyond the guard band.
     pub const GUARD: u32 = 0xF;
-    /// Before the near plane.
+    /// In front of the near plane.
     pub const NEAR: u32 = 1 << 4;
     /// Beyond the far plane.
     pub const FAR: u32 = 1 << 5;
-    /// w is too small.
+    /// w is less than [`LEAST_W`].
     pub const BEHIND: u32 = 1 << 6;
-    /// Not a number, or infinite: the primitive is dropped.
+    /// A coordinate is NaN or infinite: the primitive is dropped.
     pub const INVALID: u32 = 1 << 7;
-    /// Left of, right of, above, below the view volume.
+    /// Left of, right of, above or below the view volume.
     pub const SIDES: [u32; 4] = [1 << 8, 1 << 9, 1 << 10, 1 << 11];
     /// Beyond any side of the view volume.
     pub const ANY_SIDE: u32 = 0xF << 8;
-    /// The first user clip distance is negative; the others follow.
+    /// The first user clip distance is negative. The next bits are for the other distances.
     pub const USER: u32 = 1 << 16;
-    /// All user clip distances.
+    /// Any user clip distance is negative.
     pub const ANY_USER: u32 = 0xFF << 16;
-    /// The first cull distance is negative; the others follow.
+    /// The first cull distance is negative. The next bits are for the other distances.
     pub const CULL: u32 = 1 << 24;
-    /// All cull distances.
+    /// Any cull distance is negative.
     pub const ANY_CULL: u32 = 0xFF << 24;
-    /// What makes clipping necessary.
+    /// The bits that make clipping necessary.
     pub const CLIP: u32 = GUARD | NEAR | FAR | BEHIND | INVALID | ANY_USER;
-    /// What makes a primitive invisible if all vertices share it.
+    /// The bits that make a primitive invisible if all its vertices share one.
     pub const OUTSIDE: u32 = NEAR | FAR | BEHIND | ANY_USER | ANY_SIDE | ANY_CULL;
 }
 
-/// A viewport as a scale and a translation: x, y, depth.
+/// A viewport as a scale and a translation of x, y and depth.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Transform {
     pub scale: [f32; 3],
     pub translate: [f32; 3],
-    /// Whether near and far planes clip.
+    /// True if the near and far planes clip.
     pub clip_depth: bool,
 }
 
 /// A vertex in the framebuffer.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct WindowVertex {
-    /// Pixels, not snapped.
+    /// The position in pixels, not snapped.
     pub window: [f32; 2],
-    /// 1/256 pixels.
+    /// The position in 1/256 pixels.
     pub snapped: [i32; 2],
     /// Depth after the viewport transform.
     pub depth: f32,
@@ -65,19 +65,20 @@ pub(super) struct WindowVertex {
     pub inverse_w: f32,
 }
 
-/// What 16 vertices become.
+/// The projections of 16 vertices.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Projections {
     pub window: [[f32; 16]; 2],
     pub snapped: [[i32; 16]; 2],
     pub depth: [f32; 16],
     pub inverse_w: [f32; 16],
-    /// See [`code`].
+    /// The clip codes; see [`code`].
     pub code: [u32; 16],
 }
 
 impl Transform {
-    /// [`Transform::project`] and [`Transform::code`] of 16 positions: a loop for the compiler to vectorize.
+    /// The results of [`Transform::project`] and [`Transform::code`] for 16 positions, in a loop that the compiler
+    /// vectorizes.
     #[inline(always)]
     pub(super) fn project_all(&self, [x, y, z, w]: &[[f32; 16]; 4]) -> Projections {
         let mut all = Projections {
@@ -101,7 +102,7 @@ impl Transform {
         all
     }
 
-    /// What stands in where a draw has no viewport.
+    /// The transform of a draw without viewports.
     pub(super) const NONE: Self = Self {
         scale: [0.0; 3],
         translate: [0.0; 3],
@@ -125,8 +126,8 @@ impl Transform {
         }
     }
 
-    /// Divides by w and maps to the viewport. Each coordinate is rounded after the division and once more after
-    /// multiplication and addition, which are fused.
+    /// Divides by w and maps to the viewport. Each coordinate is rounded after the division, and once more after a
+    /// fused multiplication and addition.
     #[inline(always)]
     pub(super) fn project(&self, [x, y, z, w]: [f32; 4]) -> WindowVertex {
         let inverse_w = 1.0 / w;
@@ -143,7 +144,7 @@ impl Transform {
         }
     }
 
-    /// Why a vertex at this position needs clipping; `projected` is its projection.
+    /// The clip code of a vertex at this position. `projected` is its projection.
     #[inline(always)]
     pub(super) fn code(&self, position: [f32; 4], projected: &WindowVertex) -> u32 {
         let [x, y, z, w] = position;
@@ -158,13 +159,13 @@ impl Transform {
         code |= bit(self.clip_depth & (z > w), code::FAR);
         let guard = GUARD as f32;
         let [wx, wy] = projected.window;
-        // Comparisons are false for what the division made NaN.
+        // Comparisons with NaN, which the division may give, are false.
         let inside = (wx.abs() <= guard) & (wy.abs() <= guard);
         code | bit(!inside & !behind, code::GUARD)
     }
 
-    /// A plane of the guard band (left, right, top, bottom): a position's x or y, times the first, and w, times the
-    /// second, add up to how far it is inside.
+    /// The coefficients (a, b) of a plane of the guard band (left, right, top, bottom): the distance inside is a times
+    /// x or y, plus b times w.
     pub(super) fn guard_plane(&self, side: usize) -> [f64; 2] {
         let axis = side / 2;
         let (scale, translate) = (f64::from(self.scale[axis]), f64::from(self.translate[axis]));
@@ -179,7 +180,7 @@ impl Transform {
 /// Adding this to a number of magnitude below 2^51 rounds it to an integer, ties to even.
 const ROUND: f64 = 6_755_399_441_055_744.0;
 
-/// Coordinates stay below this magnitude in 1/256 pixels, wherever they were.
+/// The bound of the magnitude of snapped coordinates, in 1/256 pixels.
 const FARTHEST: f64 = 16_777_216.0;
 
 /// Snaps a window coordinate to 1/256 pixels: the distance from the centre of pixel 0 is rounded, ties to even.
@@ -191,11 +192,11 @@ pub(super) fn snap(window: f32) -> i32 {
         reason = "it would leave what is no number as it is"
     )]
     let scaled = scaled.max(-FARTHEST).min(FARTHEST);
-    // The sum's low bits are the integer.
+    // The integer is in the sum's low bits.
     (scaled + ROUND).to_bits() as i32 + ONE / 2
 }
 
-/// As [`snap`], with ties away from zero, as lines and points are snapped.
+/// Snaps a window coordinate as [`snap`] does, but with ties away from zero, for lines and points.
 pub(super) fn snap_away(window: f32) -> i32 {
     snap_length(window - 0.5) + ONE / 2
 }
@@ -206,7 +207,7 @@ pub(super) fn snap_length(length: f32) -> i32 {
     (scaled + 0.5f64.copysign(scaled)) as i32
 }
 
-/// The pixels whose centres lie within a viewport, edges snapped as vertices are.
+/// The pixels whose centres lie within a viewport. Its edges are snapped as vertices are.
 pub(super) fn pixels(viewport: &Viewport) -> Rect {
     let span = |start: f32, length: f32| {
         let (a, b) = (snap(start), snap(start + length));

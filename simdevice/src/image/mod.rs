@@ -1,10 +1,10 @@
-//! Images: where each texel of each subresource lies in memory.
+//! Images: the memory layout of the texels of each subresource.
 //!
-//! Every aspect is a plane of its own: all of its layers, each holding its mip levels from the largest down. A
-//! level holds its samples one after another, a sample its slices, a slice its rows; rows begin at multiples of
-//! [`ROW_ALIGNMENT`]. So a row of one sample is always consecutive, whatever the image.
+//! Every aspect is a separate plane with all of its layers. A layer has its mip levels from the largest down. A level
+//! has its samples one after another, a sample its slices, a slice its rows. Rows begin at multiples of
+//! [`ROW_ALIGNMENT`]. Therefore a row of one sample is always contiguous.
 //!
-//! A compressed image's blocks of texels take the place of texels: layouts and copies count them.
+//! In a compressed image, blocks of texels take the place of texels in layouts and copies.
 
 pub(crate) mod resolve;
 
@@ -14,13 +14,13 @@ use devmem::{Allocation, OutOfBounds, host};
 use std::sync::Arc;
 use std::sync::{Mutex, PoisonError};
 
-/// Every row of texels begins at a multiple of this many bytes, a line of the host's cache.
+/// The alignment of rows in bytes: a line of the host's cache.
 pub const ROW_ALIGNMENT: u64 = 64;
 
-/// Every image begins at a multiple of this many bytes.
+/// The alignment of images in bytes.
 pub const IMAGE_ALIGNMENT: u64 = 256;
 
-/// How many dimensions an image has.
+/// The number of dimensions of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ImageKind {
     /// One.
@@ -31,48 +31,48 @@ pub enum ImageKind {
     D3,
 }
 
-/// What an image is, apart from its memory.
+/// The description of an image, without its memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct ImageDesc {
-    /// How many dimensions it has.
+    /// The number of dimensions.
     pub kind: ImageKind,
-    /// How its texels are stored.
+    /// The format of its texels.
     pub format: Format,
-    /// Texels of level 0 in x, y and z.
+    /// The number of texels of level 0 in x, y and z.
     pub extent: [u32; 3],
-    /// Mip levels.
+    /// The number of mip levels.
     pub mip_levels: u32,
-    /// Array layers.
+    /// The number of array layers.
     pub array_layers: u32,
-    /// Samples per texel.
+    /// The number of samples per texel.
     pub samples: u32,
 }
 
-/// Where one subresource (an aspect, a mip level, a layer) lies.
+/// The memory layout of one subresource (an aspect, a mip level, a layer).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SubresourceLayout {
-    /// How its texels are stored.
+    /// The format of its texels.
     pub format: Format,
-    /// Its texels, or blocks of texels, in x, y and z.
+    /// The number of texels, or blocks of texels, in x, y and z.
     pub extent: [u32; 3],
-    /// Bytes from the image's beginning to its own.
+    /// The bytes from the image's beginning to the subresource.
     pub offset: u64,
-    /// Bytes that it spans.
+    /// The bytes that it spans.
     pub size: u64,
-    /// Bytes from one row to the next.
+    /// The bytes from one row to the next.
     pub row_pitch: u64,
-    /// Bytes from one slice of a 3D image to the next.
+    /// The bytes from one slice of a 3D image to the next.
     pub depth_pitch: u64,
-    /// Bytes from one sample's texels to the next sample's.
+    /// The bytes from one sample's texels to the next sample's.
     pub sample_pitch: u64,
-    /// Bytes from this subresource to that of the next layer.
+    /// The bytes from this subresource to that of the next layer.
     pub array_pitch: u64,
 }
 
-/// Why an image could not be created.
+/// The reasons why an image could not be created.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ImageError {
-    /// A size, level, layer or sample count is zero, more than 32 levels, or the size in bytes overflows.
+    /// A size, level, layer or sample count is zero, there are more than 32 levels, or the size in bytes overflows.
     #[error("an image of this shape has no layout")]
     Shape,
     /// The memory is too small.
@@ -81,13 +81,13 @@ pub enum ImageError {
 }
 
 impl ImageDesc {
-    /// Texels of a mip level in x, y and z.
+    /// The number of texels of a mip level in x, y and z.
     pub fn mip_extent(&self, level: u32) -> [u32; 3] {
         self.extent
             .map(|texels| texels.checked_shr(level).unwrap_or(0).max(1))
     }
 
-    /// Bytes that the image takes, or `None` if it has no layout (see [`ImageError::Shape`]).
+    /// The bytes that the image takes, or `None` if it has no layout (see [`ImageError::Shape`]).
     pub fn memory_size(&self) -> Option<u64> {
         let shape = [self.mip_levels, self.array_layers, self.samples];
         if shape.contains(&0) || self.extent.contains(&0) || self.mip_levels > u32::BITS {
@@ -96,7 +96,7 @@ impl ImageDesc {
         self.plane_offset(self.format.aspects().len())
     }
 
-    /// Where a subresource lies, or `None` if the image does not have it.
+    /// The layout of a subresource, or `None` if the image does not have it.
     pub fn subresource(&self, aspect: Aspect, level: u32, layer: u32) -> Option<SubresourceLayout> {
         self.memory_size()?;
         let plane = self.format.aspects().iter().position(|&a| a == aspect)?;
@@ -113,7 +113,7 @@ impl ImageDesc {
         Some(layout)
     }
 
-    /// Bytes of the first `planes` aspects.
+    /// The bytes of the first `planes` aspects.
     fn plane_offset(&self, planes: usize) -> Option<u64> {
         self.format.aspects()[..planes]
             .iter()
@@ -123,14 +123,14 @@ impl ImageDesc {
             })
     }
 
-    /// Bytes of the first `levels` mip levels of one layer.
+    /// The bytes of the first `levels` mip levels of one layer.
     fn level_offset(&self, aspect: Aspect, levels: u32) -> Option<u64> {
         (0..levels).try_fold(0u64, |sum, level| {
             sum.checked_add(self.level_layout(aspect, level)?.size)
         })
     }
 
-    /// A mip level's layout, but for its place.
+    /// The layout of a mip level. `offset` and `array_pitch` are zero.
     fn level_layout(&self, aspect: Aspect, level: u32) -> Option<SubresourceLayout> {
         let format = self.format.plane(aspect)?;
         let side = format.block_side();
@@ -154,7 +154,7 @@ impl ImageDesc {
 }
 
 impl SubresourceLayout {
-    /// The layout of one sample, which is that of an image of one sample.
+    /// The layout of one sample: that of an image with a single sample.
     pub fn sample(&self, sample: u32) -> Self {
         Self {
             offset: self
@@ -165,8 +165,8 @@ impl SubresourceLayout {
         }
     }
 
-    /// The offset from the image's beginning of texel (x, y, z), and how many bytes of its row begin there; `None`
-    /// outside the subresource.
+    /// The offset of texel (x, y, z) from the image's beginning, and the number of bytes from there to the end of its
+    /// row; `None` outside the subresource.
     #[inline]
     fn texel(&self, [x, y, z]: [u32; 3]) -> Option<(u64, u64)> {
         let [width, height, depth] = self.extent;
@@ -174,7 +174,7 @@ impl SubresourceLayout {
             return None;
         }
         let texel_size = self.format.texel_size() as u64;
-        // What lies inside the subresource was computed without overflow when it was laid out.
+        // Offsets in the subresource did not overflow when it was laid out.
         let inside = u64::from(z) * self.depth_pitch
             + u64::from(y) * self.row_pitch
             + u64::from(x) * texel_size;
@@ -188,21 +188,18 @@ impl SubresourceLayout {
 /// An image bound to memory.
 #[derive(Clone, Debug)]
 pub struct Image {
-    /// What it is.
+    /// The description.
     pub desc: ImageDesc,
-    /// Its memory.
+    /// The memory that holds the texels.
     pub memory: Arc<Allocation>,
-    /// The byte at which it begins there.
+    /// The offset of the image in the memory, in bytes.
     pub offset: u64,
-    /// A compressed image's texels, once they were wanted.
+    /// The decoded texels of a compressed image, if they were needed.
     decompressed: Arc<Decompressed>,
 }
 
 impl Image {
-    /// Places an image at byte `offset` of `memory`.
-    ///
-    /// # Errors
-    /// [`ImageError`] if it has no layout or does not fit.
+    /// Binds an image to byte `offset` of `memory`.
     pub fn new(desc: ImageDesc, memory: Arc<Allocation>, offset: u64) -> Result<Self, ImageError> {
         let size = desc.memory_size().ok_or(ImageError::Shape)?;
         if offset
@@ -223,12 +220,13 @@ impl Image {
         })
     }
 
-    /// Where a subresource lies, or `None` if the image does not have it.
+    /// The layout of a subresource, or `None` if the image does not have it.
     pub fn subresource(&self, aspect: Aspect, level: u32, layer: u32) -> Option<SubresourceLayout> {
         self.desc.subresource(aspect, level, layer)
     }
 
-    /// Bytes `size` from texel `at` on, as an offset into the memory, if they lie in one row of the subresource.
+    /// The offset in the memory of texel `at`; `None` if `size` bytes from there on do not lie in one row of the
+    /// subresource.
     #[inline]
     pub(crate) fn row(&self, layout: &SubresourceLayout, at: [u32; 3], size: u64) -> Option<u64> {
         let (offset, rest) = layout.texel(at)?;
@@ -237,16 +235,16 @@ impl Image {
             .flatten()
     }
 
-    /// Reads the bytes of consecutive texels of a row from texel `at` (x, y, z) on. `None`, and `out` is untouched,
-    /// if they do not lie in that row.
+    /// Reads the bytes of consecutive texels of a row from texel `at` (x, y, z) on. Returns `None` and leaves `out`
+    /// unchanged if they do not lie in that row.
     #[inline]
     pub fn read_row(&self, layout: &SubresourceLayout, at: [u32; 3], out: &mut [u8]) -> Option<()> {
         let offset = self.row(layout, at, out.len() as u64)?;
         self.memory.read(offset, out).ok()
     }
 
-    /// Writes the bytes of consecutive texels of a row from texel `at` (x, y, z) on. `None`, and nothing is
-    /// written, if they do not lie in that row.
+    /// Writes the bytes of consecutive texels of a row from texel `at` (x, y, z) on. Returns `None` and writes nothing
+    /// if they do not lie in that row.
     #[inline]
     pub fn write_row(&self, layout: &SubresourceLayout, at: [u32; 3], bytes: &[u8]) -> Option<()> {
         let offset = self.row(layout, at, bytes.len() as u64)?;
@@ -254,35 +252,35 @@ impl Image {
     }
 }
 
-/// A range of an image's subresources, read as a format.
+/// A range of an image's subresources, interpreted in a format.
 #[derive(Clone, Debug)]
 pub struct ImageView {
     /// The image.
     pub image: Arc<Image>,
-    /// How texels are read.
+    /// The format of texels.
     pub format: Format,
     /// The first mip level.
     pub base_mip_level: u32,
-    /// How many levels.
+    /// The number of levels.
     pub level_count: u32,
     /// The first array layer.
     pub base_layer: u32,
-    /// How many layers.
+    /// The number of layers.
     pub layer_count: u32,
 }
 
-/// What is kept of a compressed image: its texels, and the generation of its memory that they were decoded from.
+/// The cache of a compressed image's texels, with the generation of the memory from which they were decoded.
 #[derive(Debug, Default)]
 struct Decompressed(Mutex<Option<(u64, Arc<Image>)>>);
 
 impl Image {
-    /// An image of the same texels without compression; `None` if this one has none, or there is no memory for it.
+    /// An image of the same texels without compression; `None` if this one is not compressed, or memory is exhausted.
     pub(crate) fn decompressed(&self) -> Option<Arc<Self>> {
         self.desc.format.decompressed()?;
         if self.memory.is_host_visible() {
             return self.decompress();
         }
-        // Decoding twice is harmless, and so is what a panic left behind.
+        // A panic while the lock was held leaves a valid value. Decoding twice is harmless.
         let mut kept = self
             .decompressed
             .0
@@ -342,7 +340,7 @@ impl Image {
                         out[column * pitch..][..pitch].copy_from_slice(block.row(line));
                     }
                 }
-                // Blocks at the edges reach beyond the image.
+                // Blocks at the edges may extend beyond the image.
                 let height = side.min(texels.extent[1] - side * row);
                 for (line, texels_of_line) in (0..height).zip(&decoded) {
                     let at = [0, side * row + line, z];
@@ -355,7 +353,8 @@ impl Image {
 }
 
 impl ImageView {
-    /// A view of the same texels without compression; itself if there is none.
+    /// A view of the same texels without compression; the same view if its format is not compressed. `None` if memory
+    /// is exhausted.
     pub(crate) fn decompressed(&self) -> Option<Self> {
         match self.format.decompressed() {
             None => Some(self.clone()),
@@ -521,7 +520,7 @@ mod decompression_tests {
             let image = image(host_visible);
             let black = [0, 0, 0, 255];
             assert_eq!(texel(&image, 0, [9, 5, 0]), black);
-            // White in the last block of the largest level, and in the only one of the smallest.
+            // The last block of the largest level is white, and so is the only block of the smallest.
             let white = [0xFF, 0xFF, 0xFF, 0xFF, 0, 0, 0, 0];
             for (level, at) in [(0, [2, 1, 0]), (2, [0; 3])] {
                 let layout = image.subresource(Aspect::Color, level, 1).unwrap();

@@ -1,10 +1,10 @@
-//! Multisample resolve: the samples of a texel become one.
+//! Multisample resolve: combines the samples of a texel.
 
 use crate::format::{Format, Numeric};
 use crate::state::ResolveMode;
 
-/// Resolves a row: `samples` are the registers of each sample's texels, of an aspect of this format, and as many as
-/// `resolved`. Integers have no mean; their first sample stands for it.
+/// Resolves a row. `samples` has the registers of each sample's texels, of an aspect of this format, as many as
+/// `resolved`. The average of integers is their first sample.
 pub fn resolve_row<'a>(
     format: Format,
     mode: ResolveMode,

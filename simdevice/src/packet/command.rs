@@ -1,4 +1,4 @@
-//! The packet, and its text.
+//! Packets, and their representation as text.
 
 use super::display::{
     By, buffer, clear_attachments, draw, gaussian_append, gaussian_append_draw, gaussian_begin,
@@ -30,7 +30,7 @@ pub enum Packet {
     CopyImage(CopyImage),
     /// Copies texels between images, scaling and converting them.
     BlitImage(BlitImage),
-    /// Copies colour texels of several samples to texels of one.
+    /// Resolves texels of several samples to texels of one sample.
     ResolveImage(ResolveImage),
     /// Fills a buffer range with a repeated 32-bit word.
     FillBuffer {
@@ -39,7 +39,7 @@ pub enum Packet {
         /// The word, in the host's byte order.
         word: u32,
     },
-    /// Writes bytes that travelled in the packet to a buffer range.
+    /// Writes bytes that the packet holds to a buffer range.
     UpdateBuffer {
         /// The range; as long as `data`.
         target: BufferRange,
@@ -52,25 +52,26 @@ pub enum Packet {
     BeginRendering(Box<Rendering>),
     /// Clears rectangles of the current pass's attachments, in submission order with its draws.
     ClearAttachments(ClearAttachments),
-    /// Starts a sorted set of Gaussians.
+    /// Begins a set of Gaussians that are sorted together.
     GaussianBegin(Box<GaussianBegin>),
     /// Adds Gaussians to the set.
     GaussianAppend(Box<GaussianAppend>),
-    /// Adds the Gaussians that a vertex program projects, one for each vertex: see [`draw::gaussian`]. Of the draw's
-    /// state only the first viewport counts, which may be upside down. Where keys are equal, they come after those that
-    /// were added with attributes.
+    /// Adds the Gaussians that a vertex program projects, one for each vertex: see
+    /// [`gaussian`](crate::program::interface::gaussian). Of the draw's state only the first viewport is used, whose
+    /// height may be negative. Gaussians whose keys are equal to those of Gaussians that were added with attributes
+    /// come after them.
     GaussianAppendDraw(Box<Draw>),
-    /// Has a fragment program make the colours of the set's fragments.
+    /// Sets the fragment program that computes the colours of the set's fragments.
     GaussianFragmentStage(Box<GaussianFragmentStage>),
-    /// Ends the set: it is sorted, binned and becomes one draw of the current pass.
+    /// Ends the set. It is sorted and binned, and becomes one draw of the current pass.
     GaussianEnd,
     /// Runs workgroups of a compute program.
     Dispatch(Box<Dispatch>),
     /// Draws points, lines or triangles in the current pass.
     Draw(Box<Draw>),
-    /// Makes everything before visible to everything after; flushes a pass's bins if it is inside one.
+    /// Makes all earlier work visible to all later work. Inside a pass, it flushes the bins.
     Barrier,
-    /// Ends the render pass: its bins are rendered and its attachments stored.
+    /// Ends the render pass: renders its bins and stores its attachments.
     EndRendering,
     /// Starts query `index` of `pool`.
     BeginQuery {
@@ -92,10 +93,11 @@ pub enum Packet {
         pool: Arc<QueryPool>,
         /// The first query.
         first: u32,
-        /// How many.
+        /// The number of queries.
         count: u32,
     },
-    /// Writes the host's monotonic time in nanoseconds once everything before has finished.
+    /// Writes the time in nanoseconds once all earlier work has finished: the host's monotonic time, or the simulated
+    /// hardware's if the device is configured so.
     WriteTimestamp {
         /// The pool.
         pool: Arc<QueryPool>,
@@ -104,7 +106,7 @@ pub enum Packet {
     },
 }
 
-/// A line without its end. What a packet is bound to is named by format, size or place, not by which it is.
+/// One line of text without its end. Images are named by format and size, and buffers by their ranges.
 impl Display for Packet {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let boxed = |[x, y, z]: [i32; 3], [width, height, depth]: [u32; 3]| {

@@ -1,4 +1,4 @@
-//! Packets for people: a line each, with the state that matters.
+//! Packets as text for people: one line each, with the most important state.
 
 use super::{
     Attachment, AttachmentClear, BufferRange, ClearAttachments, GaussianAppend, GaussianBegin,
@@ -19,7 +19,7 @@ impl<F: Fn(&mut Formatter<'_>) -> fmt::Result> Display for By<F> {
     }
 }
 
-/// `separator` between the items.
+/// The items with `separator` between them.
 pub(super) fn joined<T: Display>(
     items: impl IntoIterator<Item = T> + Clone,
     separator: &str,
@@ -257,7 +257,7 @@ pub(super) fn gaussian_append_draw(draw: &Draw) -> impl Display {
     By(move |f: &mut Formatter<'_>| write!(f, "{what}, shaded"))
 }
 
-/// First and count of vertices and of instances.
+/// The text of appended Gaussians. Vertices and instances are each given by their first number and their count.
 pub(super) fn appended(
     indexed: bool,
     [first, count]: [u32; 2],

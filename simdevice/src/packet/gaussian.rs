@@ -7,28 +7,29 @@ use crate::state::gaussian::{Camera, GaussianState};
 use crate::state::{Rect, Viewport};
 use std::sync::Arc;
 
-/// See [`Packet::GaussianBegin`].
+/// The beginning of a set: see [`Packet::GaussianBegin`](crate::Packet::GaussianBegin).
 #[derive(Clone, Debug, PartialEq)]
 pub struct GaussianBegin {
-    /// What the pipeline fixes.
+    /// The state that the pipeline fixes.
     pub state: Arc<GaussianState>,
-    /// The camera, which means nothing to what a vertex program projects. In a pass with views it is that of the first
-    /// one, and of all without one of their own.
+    /// The camera. Gaussians that a vertex program projects do not use it. In a pass with views it is the camera of the
+    /// first view, and of all views that have no camera of their own.
     pub camera: Camera,
-    /// The cameras of the other views of the pass, in their order.
+    /// The cameras of the pass's views after the first, in their order.
     pub further_cameras: Vec<Camera>,
-    /// The viewport; its width and height are the W and H of the projection.
+    /// The viewport. Its width and height are W and H of the projection.
     pub viewport: Viewport,
-    /// Pixels outside are not touched.
+    /// The pixels that may be written.
     pub scissor: Rect,
 }
 
-/// The functions that are applied to attributes as they are read, in binary64, rounded once to binary32.
+/// The functions that are applied to attributes as they are read. They are computed in binary64 and rounded once to
+/// binary32.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Activations {
-    /// Standard deviations are exponentials of what is stored.
+    /// True if standard deviations are exponentials of the stored values.
     pub log_scale: bool,
-    /// Opacities are `1 / (1 + exp(-x))` of what is stored.
+    /// True if opacities are `1 / (1 + exp(-x))` of the stored values `x`.
     pub logit_opacity: bool,
 }
 
@@ -41,61 +42,61 @@ pub struct GaussianAttributes {
     pub scale: AttributeStream,
     /// The quaternion w, x, y, z; it need not be normalised.
     pub rotation: AttributeStream,
-    /// Opacity.
+    /// The opacity.
     pub opacity: AttributeStream,
-    /// `(degree + 1)^2` spherical harmonics coefficients of red, green and blue.
+    /// The `(degree + 1)^2` spherical harmonics coefficients of red, green and blue.
     pub spherical_harmonics: Vec<AttributeStream>,
-    /// What standard deviations and opacities are of what is stored.
+    /// The functions from stored values to standard deviations and opacities.
     pub activations: Activations,
-    /// What is done to them, usually by instance.
+    /// The transform of the Gaussians, usually by instance.
     pub model: ModelAttributes,
 }
 
 /// The vertex attributes that place a copy of Gaussians in the world.
 #[derive(Clone, Debug, Default)]
 pub struct ModelAttributes {
-    /// The rows of a 3x4 matrix from the Gaussians' space to the world, 4 components each; the identity without it.
+    /// The rows of a 3x4 matrix from the Gaussians' space to the world, with 4 components each. `None` is the identity.
     pub matrix: Option<Box<[AttributeStream; 3]>>,
-    /// A factor of the opacity; 1 without it.
+    /// The factor of the opacity. `None` is 1.
     pub opacity: Option<AttributeStream>,
 }
 
 impl ModelAttributes {
-    /// Whether there is anything to be done.
+    /// True if there is a matrix or a factor.
     pub fn is_some(&self) -> bool {
         self.matrix.is_some() || self.opacity.is_some()
     }
 }
 
-/// See [`Packet::GaussianAppend`].
+/// Gaussians with attributes: see [`Packet::GaussianAppend`](crate::Packet::GaussianAppend).
 #[derive(Clone, Debug)]
 pub struct GaussianAppend {
-    /// Where the Gaussians are.
+    /// The attributes of the Gaussians.
     pub attributes: GaussianAttributes,
-    /// The index buffer that picks them; without one they are consecutive.
+    /// The index buffer that selects vertices. Without one, vertices are consecutive.
     pub indices: Option<IndexStream>,
     /// The first vertex, or the first index.
     pub first: u32,
-    /// How many vertices or indices.
+    /// The number of vertices or indices.
     pub count: u32,
     /// The first instance.
     pub first_instance: u32,
-    /// How many instances.
+    /// The number of instances.
     pub instance_count: u32,
 }
 
-/// See [`Packet::GaussianFragmentStage`](crate::Packet::GaussianFragmentStage). Blending and write masks are those of the
-/// [`GaussianState`](super::GaussianState), one per attachment.
+/// The fragment program of a set: see [`Packet::GaussianFragmentStage`](crate::Packet::GaussianFragmentStage). Blending
+/// and write masks are those of [`GaussianState`], one per attachment.
 #[derive(Clone, Debug)]
 pub struct GaussianFragmentStage {
     /// The program.
     pub program: Arc<GaussianFragmentProgram>,
-    /// What it is bound to.
+    /// The bindings of the program.
     pub bindings: Bindings,
-    /// Whether every sample is shaded for itself.
+    /// True if the program runs once for each sample.
     pub sample_shading: bool,
-    /// Alpha makes coverage.
+    /// True if the alpha of the fragment determines its coverage.
     pub alpha_to_coverage: bool,
-    /// Alpha becomes 1 after that.
+    /// True if alpha is replaced by 1 after coverage was determined.
     pub alpha_to_one: bool,
 }

@@ -1,4 +1,5 @@
-//! Packets: what the driver asks of the device. Plain data; everything a packet needs it holds by [`Arc`](std::sync::Arc).
+//! Packets: the commands that a driver gives to the device. A packet is plain data, and holds everything that it needs
+//! by [`Arc`](std::sync::Arc).
 
 mod command;
 mod display;

@@ -1,54 +1,54 @@
-//! Render passes: their attachments, and what is cleared within them.
+//! Render passes: their attachments, and clears of attachments within a pass.
 
 use crate::format::ClearValue;
 use crate::image::ImageView;
 use crate::state::{Rect, ResolveMode};
 
-/// What a pass does with an attachment's contents when it begins.
+/// The treatment of an attachment's contents when a pass begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LoadOp {
-    /// Reads them.
+    /// Reads the contents.
     Load,
-    /// Replaces them.
+    /// Replaces the contents by a value.
     Clear(ClearValue),
-    /// Leaves them undefined (the device leaves what was there).
+    /// Leaves the contents undefined. This device keeps them.
     DontCare,
 }
 
-/// What a pass does with an attachment's contents when it ends.
+/// The treatment of an attachment's contents when a pass ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StoreOp {
-    /// Writes them to memory.
+    /// Writes the contents to memory.
     Store,
-    /// Drops them (they may be written all the same).
+    /// Leaves the memory undefined. This device may write the contents or not.
     DontCare,
-    /// The attachment was not written.
+    /// Leaves the memory as it is, because the pass does not write the attachment.
     None,
 }
 
 /// An attachment of a pass.
 #[derive(Clone, Debug)]
 pub struct Attachment {
-    /// What is rendered to.
+    /// The view of the image that is rendered to.
     pub view: ImageView,
-    /// What happens at the beginning.
+    /// The operation at the beginning of the pass.
     pub load: LoadOp,
-    /// What happens at the end.
+    /// The operation at the end of the pass.
     pub store: StoreOp,
-    /// Where the pass leaves one sample for each texel of its area when it ends, if anywhere: a view of an image of
-    /// one sample, as large as `view`. What `store` says doesn't matter to it.
+    /// The view to which the pass's area is resolved at the end, if any, and the mode. `store` does not apply to it. It
+    /// has one sample per texel, and is as large as `view`.
     pub resolve: Option<(ImageView, ResolveMode)>,
 }
 
-/// See [`Packet::BeginRendering`].
+/// A render pass: see [`Packet::BeginRendering`](crate::Packet::BeginRendering).
 #[derive(Clone, Debug)]
 pub struct Rendering {
     /// The pixels that the pass may touch.
     pub area: Rect,
-    /// How many layers of each attachment are rendered.
+    /// The number of layers of each attachment that are rendered.
     pub layer_count: u32,
-    /// The layers that are views, a bit each: every draw is for all of them and for no other layer, which the pass leaves
-    /// alone. Without any, draws say their layers.
+    /// The layers that are views, one bit each. Every draw is then rendered to all of these layers, and the pass does
+    /// not change other layers. If no bit is set, the vertices of a draw name the layer.
     pub view_mask: u32,
     /// Colour attachments by location; unused ones are `None`.
     pub color: Vec<Option<Attachment>>,
@@ -58,27 +58,27 @@ pub struct Rendering {
     pub stencil: Option<Attachment>,
 }
 
-/// See [`Packet::ClearAttachments`].
+/// Clears within a pass: see [`Packet::ClearAttachments`](crate::Packet::ClearAttachments).
 #[derive(Clone, Debug)]
 pub struct ClearAttachments {
-    /// What is cleared to which value.
+    /// The attachments to clear, with their values.
     pub clears: Vec<AttachmentClear>,
-    /// Where, in framebuffer pixels and layers (first, count).
+    /// The rectangles to clear in framebuffer pixels, each with its first layer and number of layers.
     pub rects: Vec<(Rect, u32, u32)>,
 }
 
-/// One attachment's clear.
+/// The clear of one attachment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum AttachmentClear {
-    /// Colour attachment number `index`.
+    /// A colour attachment.
     Color {
         /// The attachment's index.
         index: usize,
         /// Its new value.
         value: ClearValue,
     },
-    /// The depth attachment.
+    /// The depth attachment, with its new depth.
     Depth(f32),
-    /// The stencil attachment.
+    /// The stencil attachment, with its new value.
     Stencil(u32),
 }

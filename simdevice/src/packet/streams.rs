@@ -1,9 +1,9 @@
-//! Streams of vertex attributes and indices in buffers, and how they are read: what lies outside a buffer is zero.
+//! Streams of vertex attributes and indices in buffers. Reads outside of a buffer yield zero.
 
 use crate::format::Format;
 use devmem::{BufferRange, host};
 
-/// Where one vertex attribute is read from. An element outside `buffer` reads as zero.
+/// The source of one vertex attribute. An element outside of `buffer` reads as zero.
 #[derive(Clone, Debug)]
 pub struct AttributeStream {
     /// The vertex buffer, from the bound offset on.
@@ -12,9 +12,9 @@ pub struct AttributeStream {
     pub stride: u32,
     /// Bytes from the vertex's start to the attribute.
     pub offset: u32,
-    /// How it is stored.
+    /// The format of the stored components.
     pub format: Format,
-    /// Read by instance (advancing every `divisor` instances; 0: never) instead of by vertex.
+    /// The number of instances for which a value is used; 0 uses the first value for all. `None` reads by vertex.
     pub instance_divisor: Option<u32>,
 }
 
@@ -25,12 +25,12 @@ pub struct IndexStream {
     pub buffer: BufferRange,
     /// Bytes per index: 1, 2 or 4.
     pub index_size: u32,
-    /// Added to every index.
+    /// The number that is added to every index.
     pub vertex_offset: i32,
 }
 
 impl AttributeStream {
-    /// The offset in memory of `bytes` bytes from an element on; `None` unless all of them lie inside the buffer.
+    /// The offset in memory of `bytes` bytes from an element on; `None` unless all of them are inside the buffer.
     #[inline]
     pub(crate) fn place(&self, element: u64, bytes: u64) -> Option<u64> {
         let start = element
@@ -42,7 +42,7 @@ impl AttributeStream {
         self.buffer.offset.checked_add(start)
     }
 
-    /// Reads bytes from an element on; zeros unless all of them lie inside the buffer.
+    /// Reads bytes from an element on. Fills `out` with zeros unless all of the bytes are inside the buffer.
     #[inline]
     pub(crate) fn read(&self, element: u64, out: &mut [u8]) {
         let place = self.place(element, out.len() as u64);
@@ -53,7 +53,7 @@ impl AttributeStream {
 }
 
 impl IndexStream {
-    /// How many indices the buffer has.
+    /// The number of indices in the buffer.
     pub(crate) fn len(&self) -> u64 {
         let memory = self.buffer.memory.len();
         let bytes = memory.saturating_sub(self.buffer.offset);
@@ -69,7 +69,8 @@ impl IndexStream {
         }
     }
 
-    /// Reads `len` indices from number `first` on, without the vertex offset; those outside the buffer are zero.
+    /// Reads `len` indices from number `first` on into `out`, without the vertex offset. Indices outside of the buffer
+    /// are zero.
     pub(crate) fn read(&self, first: u64, len: u32, out: &mut Vec<u32>) {
         let size = u64::from(self.index_size.max(1));
         out.clear();
@@ -78,11 +79,11 @@ impl IndexStream {
         if known == 0 {
             return;
         }
-        // Both lie inside the buffer, so that neither overflows.
+        // The indices are inside the buffer, so that neither operation overflows.
         let start = self.buffer.offset + first * size;
         let out = &mut out[..known];
         let memory = &self.buffer.memory;
-        // What was known to lie inside cannot be refused.
+        // Reads inside the buffer do not fail.
         match self.index_size {
             1 => {
                 let mut bytes: Vec<u8> = host::zeroed(known);

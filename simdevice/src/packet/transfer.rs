@@ -1,5 +1,5 @@
-//! What packets of copies, blits, resolves and clears say. Where an image is compressed, copies count its blocks of
-//! texels in place of texels; blits count texels always.
+//! Packets of copies, blits, resolves and clears. Copies of compressed images count blocks instead of texels; blits
+//! always count texels.
 
 use super::BufferRange;
 use crate::format::{Aspect, ClearValue};
@@ -15,22 +15,22 @@ pub struct BufferCopyRegion {
     pub source_offset: u64,
     /// The first byte in the target range.
     pub target_offset: u64,
-    /// How many bytes.
+    /// The number of bytes.
     pub size: u64,
 }
 
-/// See [`Packet::CopyBuffer`](super::Packet::CopyBuffer).
+/// A copy between buffers: see [`Packet::CopyBuffer`](super::Packet::CopyBuffer).
 #[derive(Clone, Debug)]
 pub struct CopyBuffer {
-    /// Where bytes come from.
+    /// The source of the bytes.
     pub source: BufferRange,
-    /// Where they go.
+    /// The destination of the bytes.
     pub target: BufferRange,
-    /// What is copied.
+    /// The regions to copy.
     pub regions: Vec<BufferCopyRegion>,
 }
 
-/// One mip level of a run of array layers, one aspect.
+/// One aspect of a mip level's consecutive array layers.
 #[derive(Clone, Copy, Debug)]
 pub struct SubresourceLayers {
     /// The aspect.
@@ -39,20 +39,20 @@ pub struct SubresourceLayers {
     pub mip_level: u32,
     /// The first array layer.
     pub base_layer: u32,
-    /// How many layers.
+    /// The number of layers.
     pub layer_count: u32,
 }
 
 /// A region of a copy between a buffer and an image.
 #[derive(Clone, Copy, Debug)]
 pub struct BufferImageRegion {
-    /// Byte offset in the buffer range.
+    /// The offset in the buffer range, in bytes.
     pub buffer_offset: u64,
     /// Texels from one row to the next in the buffer; 0 means tightly packed.
     pub buffer_row_length: u32,
     /// Rows from one slice or layer to the next in the buffer; 0 means tightly packed.
     pub buffer_image_height: u32,
-    /// What part of the image.
+    /// The image's subresources.
     pub subresource: SubresourceLayers,
     /// The first texel: x, y, z.
     pub image_offset: [i32; 3],
@@ -60,105 +60,106 @@ pub struct BufferImageRegion {
     pub image_extent: [u32; 3],
 }
 
-/// See [`Packet::CopyBufferToImage`](super::Packet::CopyBufferToImage) and [`Packet::CopyImageToBuffer`](super::Packet::CopyImageToBuffer).
+/// A copy between a buffer and an image: see [`Packet::CopyBufferToImage`](super::Packet::CopyBufferToImage) and
+/// [`Packet::CopyImageToBuffer`](super::Packet::CopyImageToBuffer).
 #[derive(Clone, Debug)]
 pub struct CopyBufferImage {
-    /// The buffer side.
+    /// The range of the buffer.
     pub buffer: BufferRange,
-    /// The image side.
+    /// The image.
     pub image: Arc<Image>,
-    /// What is copied.
+    /// The regions to copy.
     pub regions: Vec<BufferImageRegion>,
 }
 
 /// A region of an image-to-image copy.
 #[derive(Clone, Copy, Debug)]
 pub struct ImageCopyRegion {
-    /// What part of the source.
+    /// The subresources of the source.
     pub source: SubresourceLayers,
-    /// The first texel there: x, y, z.
+    /// The first texel of the source: x, y, z.
     pub source_offset: [i32; 3],
-    /// What part of the target.
+    /// The subresources of the target.
     pub target: SubresourceLayers,
-    /// The first texel there: x, y, z.
+    /// The first texel of the target: x, y, z.
     pub target_offset: [i32; 3],
     /// Texels in x, y and z.
     pub extent: [u32; 3],
 }
 
-/// See [`Packet::CopyImage`](super::Packet::CopyImage).
+/// A copy between images: see [`Packet::CopyImage`](super::Packet::CopyImage).
 #[derive(Clone, Debug)]
 pub struct CopyImage {
-    /// Where texels come from.
+    /// The source of the texels.
     pub source: Arc<Image>,
-    /// Where they go.
+    /// The destination of the texels.
     pub target: Arc<Image>,
-    /// What is copied.
+    /// The regions to copy.
     pub regions: Vec<ImageCopyRegion>,
 }
 
-/// A range of an image's subresources, one aspect.
+/// A range of an image's mip levels and array layers, in one aspect.
 #[derive(Clone, Copy, Debug)]
 pub struct SubresourceRange {
     /// The aspect.
     pub aspect: Aspect,
     /// The first mip level.
     pub base_mip_level: u32,
-    /// How many levels.
+    /// The number of levels.
     pub level_count: u32,
     /// The first array layer.
     pub base_layer: u32,
-    /// How many layers.
+    /// The number of layers.
     pub layer_count: u32,
 }
 
-/// See [`Packet::ClearImage`](super::Packet::ClearImage).
+/// A clear of an image: see [`Packet::ClearImage`](super::Packet::ClearImage).
 #[derive(Clone, Debug)]
 pub struct ClearImage {
     /// The image.
     pub image: Arc<Image>,
-    /// The value.
+    /// The value of the cleared texels.
     pub value: ClearValue,
-    /// What is cleared.
+    /// The ranges to clear.
     pub ranges: Vec<SubresourceRange>,
 }
 
 /// A region of a blit: two boxes, each given by two corners. Corners in the opposite order mirror the region.
 #[derive(Clone, Copy, Debug)]
 pub struct ImageBlitRegion {
-    /// What part of the source.
+    /// The subresources of the source.
     pub source: SubresourceLayers,
-    /// Two corners there, between texels: x, y, z.
+    /// Two opposite corners of the source's box, on borders of texels: x, y, z.
     pub source_corners: [[i32; 3]; 2],
-    /// What part of the target; the same aspect.
+    /// The subresources of the target, of the same aspect.
     pub target: SubresourceLayers,
-    /// The corners that they are mapped to.
+    /// The corners of the target's box that the source's corners are mapped to.
     pub target_corners: [[i32; 3]; 2],
 }
 
-/// See [`Packet::BlitImage`](super::Packet::BlitImage). Either image's format may be any that the other's converts to: of
-/// integers of the same sign, of anything that is no integer, or of the same depth and stencil.
+/// A blit: see [`Packet::BlitImage`](super::Packet::BlitImage). Formats are converted between integers of the same
+/// signedness, between any formats that are not integer, and between the same formats of depth and stencil.
 #[derive(Clone, Debug)]
 pub struct BlitImage {
-    /// Where texels come from; of one sample.
+    /// The source of the texels, of one sample.
     pub source: Arc<Image>,
-    /// Where they go; of one sample.
+    /// The destination of the texels, of one sample.
     pub target: Arc<Image>,
-    /// How texels are found between those of the source. Integers, depth and stencil are taken from the nearest.
+    /// The filter between texels of the source. Integers, depth and stencil are taken from the nearest texel.
     pub filter: Filter,
-    /// What is copied.
+    /// The regions to blit.
     pub regions: Vec<ImageBlitRegion>,
 }
 
-/// See [`Packet::ResolveImage`](super::Packet::ResolveImage). The formats are the same.
+/// A resolve: see [`Packet::ResolveImage`](super::Packet::ResolveImage). Both images have the same format.
 #[derive(Clone, Debug)]
 pub struct ResolveImage {
-    /// Where samples come from.
+    /// The source of the samples.
     pub source: Arc<Image>,
-    /// Where texels go; of one sample.
+    /// The destination of the texels, of one sample.
     pub target: Arc<Image>,
-    /// How samples become one.
+    /// The function from samples to a texel.
     pub mode: ResolveMode,
-    /// What is resolved.
+    /// The regions to resolve.
     pub regions: Vec<ImageCopyRegion>,
 }

@@ -1,4 +1,4 @@
-//! What a draw or dispatch binds its programs to.
+//! The buffers, images, samplers and constants that the programs of a draw or dispatch are bound to.
 
 use crate::packet::BufferRange;
 use crate::texture::{ImageBinding, ImageTable, Sampler};
@@ -8,21 +8,22 @@ use isa::resources::{GlobalMemory, NoGlobalMemory, Resources, words};
 use std::sync::Arc;
 use std::sync::atomic::AtomicU32;
 
-/// Buffers, images, samplers and push constants, by the bind points of a program. What lies beyond the end of a list
-/// is not bound.
+/// Buffers, images, samplers and push constants, each list indexed by bind point. Bind points beyond the end of a list
+/// are unbound.
 #[derive(Clone, Debug, Default)]
 pub struct Bindings {
-    /// Buffers; `None` is a buffer of size zero. Offsets are multiples of 4.
+    /// The buffers; `None` is a buffer of size zero. Offsets are multiples of 4.
     pub buffers: Vec<Option<BufferRange>>,
-    /// Images and texel buffers.
+    /// The images and texel buffers.
     pub images: Vec<ImageBinding>,
-    /// Samplers.
+    /// The samplers.
     pub samplers: Vec<Option<Sampler>>,
-    /// Push constants; what lies beyond the end reads as zero.
+    /// The push constants. Reads beyond the end yield zero.
     pub push_constants: Vec<u8>,
-    /// The buffers that the program reaches by address.
+    /// The buffers that the program reads and writes by device address.
     pub addresses: Option<Arc<AddressTable>>,
-    /// The memory that the program may write to, so that what was derived from it is derived anew.
+    /// The memory that the program may write. After the program, data that were derived from this memory are derived
+    /// again.
     pub written: Vec<Arc<Allocation>>,
 }
 
@@ -31,17 +32,18 @@ pub struct Bindings {
 pub struct AddressTable(Vec<(u64, BufferRange)>);
 
 impl AddressTable {
-    /// A table of buffers with the address of each one's first byte, in order of addresses, none within another.
+    /// Makes a table of buffers, each with the address of its first byte. They are in order of addresses and do not
+    /// overlap.
     pub fn new(buffers: Vec<(u64, BufferRange)>) -> Self {
         Self(buffers)
     }
 
-    /// The buffers.
+    /// The buffers of the table.
     pub fn buffers(&self) -> impl Iterator<Item = &BufferRange> {
         self.0.iter().map(|(_, range)| range)
     }
 
-    /// The buffer that an address lies in, and the address of the buffer's first byte.
+    /// Finds the buffer that contains an address. Returns it with the address of its first byte.
     pub fn find(&self, address: u64) -> Option<(&BufferRange, u64)> {
         let after = self.0.partition_point(|(start, _)| *start <= address);
         let (start, range) = self.0.get(after.checked_sub(1)?)?;
@@ -55,7 +57,7 @@ impl GlobalMemory for AddressTable {
     }
 }
 
-/// Bindings as programs reach them, made once for a draw or dispatch.
+/// Bindings in the form that programs read, made once for a draw or dispatch.
 pub(crate) struct BoundResources<'a> {
     bindings: &'a Bindings,
     images: ImageTable,
@@ -63,7 +65,7 @@ pub(crate) struct BoundResources<'a> {
 }
 
 impl Bindings {
-    /// Makes them ready for programs that run at a SIMD level.
+    /// Prepares the bindings for programs that run at a SIMD level.
     pub(crate) fn bind(&self, level: Level) -> BoundResources<'_> {
         let (images, samplers) = (self.images.iter().cloned(), self.samplers.iter().copied());
         BoundResources {
@@ -73,7 +75,7 @@ impl Bindings {
         }
     }
 
-    /// Marks what the program may have written to as changed.
+    /// Marks the memory that the program may have written as changed.
     pub(crate) fn bump_generations(&self) {
         for memory in &self.written {
             memory.bump_generation();
@@ -82,7 +84,7 @@ impl Bindings {
 }
 
 impl BoundResources<'_> {
-    /// What a program reaches.
+    /// The resources of a program.
     pub(crate) fn resources(&self) -> Resources<'_> {
         Resources {
             buffers: &self.bindings.buffers,

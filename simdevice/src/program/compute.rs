@@ -1,4 +1,4 @@
-//! Compute programs made ready for dispatches.
+//! Compute programs that are compiled for dispatches.
 
 use super::pool::MachinePool;
 use crate::program::interface::ComputeInput;
@@ -8,22 +8,22 @@ use isa::ir::{Program, VECTOR_LANES};
 use isa::machine::Executable;
 use isa::validate::InvalidProgram;
 
-/// A program ready to be dispatched on one device.
+/// A compute program that is compiled for one device.
 #[derive(Debug)]
 pub struct ComputeProgram {
     pub(crate) machines: MachinePool,
-    /// By slot.
+    /// The meaning of each input, by slot.
     pub(crate) inputs: Vec<Option<ComputeInput>>,
-    /// Invocations of a workgroup.
+    /// The number of invocations in a workgroup.
     pub(crate) invocations: usize,
 }
 
 impl ComputeProgram {
-    /// Makes a program ready. A workgroup has `invocations`, which are the batch's first lanes in order of their
-    /// index; `inputs` says by slot what the program's inputs are.
+    /// Compiles a program. A workgroup has `invocations`, which are the first lanes of a batch in order of their index.
+    /// `inputs` is the meaning of the program's inputs, by slot.
     ///
     /// # Errors
-    /// [`InvalidProgram`] if the program cannot run on the device, be it for the size of its workgroups.
+    /// [`InvalidProgram`] if the program cannot run on the device, for example because its workgroups are too large.
     pub fn new(
         level: Level,
         program: Program,

@@ -1,4 +1,4 @@
-//! Fragment programs made ready for draws of primitives and of Gaussians.
+//! Fragment programs that are compiled for draws of primitives and of Gaussians.
 
 use super::pool::{MachinePool, PooledMachine};
 use crate::limits::DRAW_SUBGROUP_SIZE;
@@ -11,28 +11,28 @@ use isa::Options;
 use isa::machine::{Executable, Machine};
 use isa::validate::InvalidProgram;
 
-/// Lanes of the two sizes of batches: few fragments are shaded in the smaller.
+/// The number of lanes of the two sizes of batches. The smaller size is for few fragments.
 pub(crate) const BATCH_LANES: [usize; 2] = [64, 256];
 
-/// Components of up to two sources of a colour attachment: the outputs' slots.
+/// The output slots of a colour attachment, by source (two for dual-source blending) and component.
 pub(crate) type ColorSlots = [[Option<u32>; 4]; 2];
 
-/// A fragment program ready for batches of quads.
+/// A fragment program that is compiled for batches of quads.
 #[derive(Debug)]
 pub struct FragmentStage {
-    /// By size of batch.
+    /// The machines, by size of batch.
     machines: [MachinePool; 2],
     pub(crate) interface: Interface,
 }
 
-/// What goes into the program and what comes out.
+/// The inputs, outputs and properties of a fragment program.
 #[derive(Debug, Default)]
 pub(crate) struct Interface {
-    /// The inputs that it reads: slot, meaning, and of varyings the place in `varyings`.
+    /// The inputs that the program reads: the slot, the meaning, and for varyings the index in `varyings`.
     pub inputs: Vec<(u32, FragmentInput, usize)>,
-    /// The varyings among them, each once, with their interpolation.
+    /// The numbers of the varyings that are read, each once for each of its interpolations.
     pub varyings: Vec<(u32, Interpolation)>,
-    /// By attachment.
+    /// The output slots, by colour attachment.
     pub colors: Vec<ColorSlots>,
     pub depth: Option<u32>,
     pub sample_mask: Option<u32>,
@@ -42,7 +42,7 @@ pub(crate) struct Interface {
     pub has_side_effects: bool,
 }
 
-/// The machines of one worker, lent when they are first needed.
+/// The machines of one worker. Each is taken from its pool at its first use.
 #[derive(Debug)]
 pub(crate) struct FragmentMachines<'a> {
     pools: &'a [MachinePool; 2],
@@ -50,13 +50,13 @@ pub(crate) struct FragmentMachines<'a> {
 }
 
 impl FragmentMachines<'_> {
-    /// The machine for a size of batch.
+    /// The machine for a size of batch: an index of [`BATCH_LANES`].
     #[inline]
     pub(crate) fn of_size(&mut self, size: usize) -> &mut Machine {
         self.lent[size].get_or_insert_with(|| self.pools[size].lend())
     }
 
-    /// Gives them back, and counts what they did.
+    /// Returns the machines to their pools, and adds their work to the counters.
     pub(crate) fn give_back(self, counters: &mut Counters) {
         for mut machine in self.lent.into_iter().flatten() {
             counters.add_work(&machine.take_work());
@@ -65,7 +65,7 @@ impl FragmentMachines<'_> {
 }
 
 impl FragmentStage {
-    /// Makes a program ready.
+    /// Compiles a program.
     ///
     /// # Errors
     /// [`InvalidProgram`] if it cannot run on the device.
@@ -87,7 +87,7 @@ impl FragmentStage {
         })
     }
 
-    /// Machines for one worker.
+    /// Makes the machines of one worker.
     pub(crate) fn machines(&self) -> FragmentMachines<'_> {
         FragmentMachines {
             pools: &self.machines,
@@ -97,7 +97,7 @@ impl FragmentStage {
 }
 
 impl Interface {
-    /// Whether programs read nothing but varyings.
+    /// True if the program reads varyings only.
     pub fn takes_varyings_alone(&self) -> bool {
         let is_varying = |kind| matches!(kind, FragmentInput::Varying { .. });
         self.inputs.iter().all(|&(_, kind, _)| is_varying(kind))
@@ -168,7 +168,7 @@ impl Interface {
     }
 }
 
-/// A resolve shader's program, ready for one device. Its varyings are those of [`resolve`].
+/// The program of a resolve shader, compiled for one device. Its varyings are those of [`resolve`].
 #[derive(Debug)]
 pub struct GaussianFragmentProgram {
     pub(crate) stage: FragmentStage,
@@ -176,7 +176,7 @@ pub struct GaussianFragmentProgram {
 }
 
 impl GaussianFragmentProgram {
-    /// Makes a program ready.
+    /// Compiles a program.
     ///
     /// # Errors
     /// [`InvalidProgram`] if it cannot run on the device.
@@ -194,7 +194,7 @@ impl GaussianFragmentProgram {
         })
     }
 
-    /// Whether it reads a depth.
+    /// True if the program reads a depth.
     pub fn reads_depth(&self) -> bool {
         self.reads_depth
     }

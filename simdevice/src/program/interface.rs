@@ -1,8 +1,9 @@
-//! The interfaces of programs: the meaning of the slots of their inputs and outputs.
+//! The interfaces of programs: the meanings of the slots of their inputs and outputs.
 
 use isa::ir::Program;
 
-/// What the varyings of a vertex program are that projects Gaussians, by number. Its position is the Gaussian's centre.
+/// The varyings of a vertex program that projects Gaussians, by number. The position that it writes is the Gaussian's
+/// centre.
 pub mod gaussian {
     /// The first of three: the covariance xx, xy, yy in px^2, along the framebuffer's axes.
     pub const COVARIANCE: u32 = 0;
@@ -10,35 +11,36 @@ pub mod gaussian {
     pub const OPACITY: u32 = 3;
     /// The first of three: red, green, blue.
     pub const COLOR: u32 = 4;
-    /// What the Gaussians are sorted by. If it is not written, that is the position's w.
+    /// The value that the Gaussians are sorted by. If it is not written, they are sorted by the position's w.
     pub const DEPTH_KEY: u32 = 7;
-    /// How many there are.
+    /// The number of varyings.
     pub const VARYINGS: u32 = 8;
 }
 
-/// What the varyings of a fragment program are that makes colours of what Gaussians accumulate, by number. All of them
-/// are zero where no Gaussian contributed.
+/// The varyings of a fragment program that computes a pixel's colours from its accumulated Gaussians, by number. All of
+/// them are zero if no Gaussian contributed.
 pub mod resolve {
-    /// The first of four: (C, 1 - T).
+    /// The first of four: the accumulated colour C as red, green and blue, and 1 - T with the transmittance T.
     pub const ACCUMULATED: u32 = 0;
     /// The mean depth, weighted by contributions.
     pub const EXPECTED_DEPTH: u32 = 4;
-    /// The depth of the last Gaussian that contributed where half of the transmittance or more was left.
+    /// The depth of the last Gaussian that contributed while the transmittance was at least a half.
     pub const MEDIAN_DEPTH: u32 = 5;
 }
 
-/// What [`DrawPipeline`] is made of. Slots of programs are indices into the lists here.
+/// The programs of a [`DrawPipeline`](crate::program::vertex::DrawPipeline). Slots of programs are indices into the
+/// lists of inputs and outputs.
 #[derive(Debug)]
 pub struct DrawPrograms {
     /// The vertex program.
     pub vertex: Program,
-    /// What its inputs are, by slot; 64-bit attributes are not read.
+    /// The meanings of its inputs, by slot. 64-bit attributes are not read.
     pub vertex_inputs: Vec<Option<VertexInput>>,
-    /// What its outputs are, by slot; `None` is not used by anyone.
+    /// The meanings of its outputs, by slot; `None` is not used.
     pub vertex_outputs: Vec<Option<VertexOutput>>,
-    /// How many varyings there are, each a 32-bit scalar.
+    /// The number of varyings, each a 32-bit scalar.
     pub varyings: u32,
-    /// The fragment stage; without one only depth and stencil are written.
+    /// The fragment stage. Without one only depth and stencil are written.
     pub fragment: Option<FragmentPrograms>,
 }
 
@@ -47,140 +49,141 @@ pub struct DrawPrograms {
 pub struct FragmentPrograms {
     /// The program.
     pub program: Program,
-    /// What its inputs are, by slot.
+    /// The meanings of its inputs, by slot.
     pub inputs: Vec<Option<FragmentInput>>,
-    /// What its outputs are, by slot; `None` is written nowhere.
+    /// The meanings of its outputs, by slot; `None` is not used.
     pub outputs: Vec<Option<FragmentOutput>>,
-    /// Depth and stencil are tested before it, whatever it does.
+    /// True if depth and stencil are tested before the program, whatever it does.
     pub early_tests: bool,
-    /// It may kill or demote.
+    /// True if the program may discard fragments or demote invocations to helpers.
     pub discards: bool,
-    /// It must run for each sample.
+    /// True if the program must run once for each sample.
     pub per_sample: bool,
-    /// It writes to memory, so that it cannot be skipped.
+    /// True if the program writes memory, so that it cannot be skipped.
     pub has_side_effects: bool,
 }
 
-/// What the device puts into a vertex program's input.
+/// The value that the device gives to an input of a vertex program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum VertexInput {
-    /// Component `component` (0 to 3) of an attribute. What a format lacks is 0, or 1 for the fourth component.
+    /// Component `component` (0 to 3) of an attribute. A component that the format lacks is 0, or 1 for the fourth
+    /// component.
     Attribute {
-        /// The attribute's index in [`Draw::attributes`].
+        /// The attribute's index in [`Draw::attributes`](crate::packet::Draw::attributes).
         stream: usize,
-        /// Which component.
+        /// The component's index.
         component: usize,
     },
-    /// The vertex's index, `vertex_offset` included.
+    /// The vertex's index, including `vertex_offset`.
     VertexIndex,
-    /// The instance's number, the first instance included.
+    /// The instance's number, including the first instance.
     InstanceIndex,
     /// The first vertex, or the vertex offset.
     BaseVertex,
     /// The first instance.
     BaseInstance,
-    /// [`Draw::draw_index`].
+    /// The draw's number within an indirect command: [`Draw::draw_index`](crate::packet::Draw::draw_index).
     DrawIndex,
-    /// The view that is drawn, which is its layer; 0 without views.
+    /// The layer of the view that is drawn; 0 without views.
     ViewIndex,
 }
 
-/// What a vertex program's output is.
+/// The meaning of an output of a vertex program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum VertexOutput {
     /// A component of the position in clip space.
     Position(usize),
     /// The side of a point in pixels.
     PointSize,
-    /// A distance that is clipped at 0.
+    /// A clip distance. Primitives are clipped at its zero.
     ClipDistance(usize),
-    /// A distance: primitives that are negative in all vertices are culled.
+    /// A cull distance. Primitives are culled if it is negative at all of their vertices.
     CullDistance(usize),
     /// The layer that is rendered to.
     Layer,
-    /// The viewport.
+    /// The index of the viewport.
     ViewportIndex,
     /// A varying.
     Varying(u32),
 }
 
-/// How a varying follows from its values at the vertices.
+/// The interpolation of a varying between its values at the vertices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Interpolation {
-    /// Perspective-correct.
+    /// Perspective-correct interpolation.
     Perspective,
-    /// Linear in the framebuffer.
+    /// Linear interpolation in the framebuffer.
     Linear,
-    /// The provoking vertex's bits.
+    /// The value at the provoking vertex, without interpolation.
     Flat,
 }
 
-/// Where within a pixel a varying is taken.
+/// The point within a pixel at which a varying is interpolated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Sampling {
-    /// At the pixel's centre, or at the sample where each sample is shaded.
+    /// The pixel's centre, or the sample if the program runs once for each sample.
     Center,
-    /// At a point within both the pixel and the primitive.
+    /// A point that is inside both the pixel and the primitive.
     Centroid,
-    /// At the sample.
+    /// The sample.
     Sample,
 }
 
-/// What the device puts into a fragment program's input.
+/// The value that the device gives to an input of a fragment program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum FragmentInput {
     /// A varying.
     Varying {
-        /// Its number.
+        /// The varying's number.
         index: u32,
-        /// How it follows from the vertices.
+        /// The interpolation between the vertices.
         interpolation: Interpolation,
-        /// Where.
+        /// The point of the interpolation.
         sampling: Sampling,
     },
-    /// x, y, depth, 1 / w.
+    /// A component of the fragment's coordinates: x, y, depth, 1 / w.
     FragCoord(usize),
-    /// The place within a point, 0 to 1.
+    /// A coordinate within a point primitive, 0 to 1.
     PointCoord(usize),
-    /// A Bool register: whether the primitive faces the front.
+    /// A Bool register: true if the primitive faces the front.
     FrontFacing,
     /// The primitive's number within the draw's instance.
     PrimitiveId,
-    /// The sample shaded.
+    /// The number of the sample that is shaded.
     SampleId,
-    /// The sample's place within the pixel, 0 to 1.
+    /// A coordinate of the sample's position within the pixel, 0 to 1.
     SamplePosition(usize),
-    /// The samples covered that this invocation is for.
+    /// The covered samples that the invocation shades.
     SampleMask,
     /// The layer.
     Layer,
-    /// The viewport.
+    /// The index of the viewport.
     ViewportIndex,
 }
 
-/// Where a fragment program's output goes.
+/// The destination of an output of a fragment program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum FragmentOutput {
-    /// A component of a colour attachment's source, the second source (of dual-source blending) if `index` is 1.
+    /// A component of a colour attachment's source.
     Color {
         /// The attachment.
         attachment: usize,
         /// The component.
         component: usize,
-        /// 0 or 1.
+        /// The source: 0, or 1 for the second source of dual-source blending.
         index: usize,
     },
     /// The depth.
     Depth,
-    /// Samples to keep.
+    /// The mask of samples to keep.
     SampleMask,
 }
 
-/// What the device puts into a program's input.
+/// The value that the device gives to an input of a compute program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ComputeInput {
     /// The workgroup's number along an axis: 0 to 2.
     WorkgroupId(usize),
-    /// How many workgroups the dispatch has along an axis: 0 to 2.
+    /// The number of workgroups of the dispatch along an axis: 0 to 2.
     WorkgroupCount(usize),
 }

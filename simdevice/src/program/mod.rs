@@ -1,7 +1,7 @@
-//! Programs made ready for the device, and what they are bound to.
+//! Programs that are compiled for the device, and their bindings.
 //!
-//! [`interface`] says what the slots of a program mean, and [`bindings`] what memory it reaches; [`vertex`],
-//! [`fragment`] and [`compute`] hold the executables, and lend the machines that run them.
+//! [`interface`] defines the meanings of a program's slots, and [`bindings`] the memory that it uses. [`vertex`],
+//! [`fragment`] and [`compute`] hold the executables and the machines that run them.
 
 pub mod bindings;
 pub mod compute;

@@ -1,10 +1,10 @@
-//! Pools of machines, which programs lend to those who run them.
+//! Pools of machines. A program lends its machines to the workers that run it.
 
 use isa::machine::{Executable, Machine};
 use std::ops::{Deref, DerefMut};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// The machines of an executable: as many as were ever wanted at once.
+/// The machines of an executable: as many as were ever in use at once.
 #[derive(Debug)]
 pub(crate) struct MachinePool {
     executable: Arc<Executable>,
@@ -19,7 +19,7 @@ impl MachinePool {
         }
     }
 
-    /// Lends a machine, which keeps what it was left with.
+    /// Lends a machine. Its registers hold whatever an earlier run left.
     pub(crate) fn lend(&self) -> PooledMachine<'_> {
         let idle = self
             .idle
@@ -34,11 +34,11 @@ impl MachinePool {
     }
 }
 
-/// A machine that goes back to its pool when it is dropped.
+/// A machine that returns to its pool when it is dropped.
 #[derive(Debug)]
 pub(crate) struct PooledMachine<'a> {
     pool: &'a MachinePool,
-    /// Present until dropped.
+    /// The machine; `None` only while it is dropped.
     machine: Option<Machine>,
 }
 

@@ -1,4 +1,4 @@
-//! Vertex programs made ready for draws, alone or with a fragment program.
+//! Vertex programs that are compiled for draws, alone or with a fragment program.
 
 use super::pool::MachinePool;
 use crate::limits::{DRAW_SUBGROUP_SIZE, MAX_CLIP_CULL_DISTANCES};
@@ -12,10 +12,10 @@ use isa::ir::{Rate, Type};
 use isa::machine::Executable;
 use isa::validate::InvalidProgram;
 
-/// Vertices of a batch.
+/// The number of vertices in a batch.
 pub(crate) const VERTEX_BATCH: usize = 128;
 
-/// A vertex and a fragment program ready for one device.
+/// A vertex and a fragment program that are compiled for one device.
 #[derive(Debug)]
 pub struct DrawPipeline {
     pub(crate) vertex: VertexProgram,
@@ -23,7 +23,7 @@ pub struct DrawPipeline {
     pub(crate) fragment: Option<FragmentStage>,
 }
 
-/// The vertex program, and what its slots mean.
+/// The vertex program, and the meanings of its slots.
 #[derive(Debug)]
 pub(crate) struct VertexProgram {
     pub machines: MachinePool,
@@ -31,7 +31,7 @@ pub(crate) struct VertexProgram {
     pub outputs: VertexOutputs,
 }
 
-/// The slots of a vertex program's outputs; `None` was not written.
+/// The slots of a vertex program's outputs; `None` is not written.
 #[derive(Debug, Default)]
 pub(crate) struct VertexOutputs {
     pub position: [Option<u32>; 4],
@@ -40,19 +40,19 @@ pub(crate) struct VertexOutputs {
     pub cull: [Option<u32>; MAX_CLIP_CULL_DISTANCES],
     pub layer: Option<u32>,
     pub viewport: Option<u32>,
-    /// By number; only those that the fragment stage may read exist.
+    /// The slots, by number of the varying. Only varyings that a fragment stage may read are included.
     pub varyings: Vec<Option<u32>>,
-    /// By number.
+    /// The interpolation, by number of the varying.
     pub interpolation: Vec<Interpolation>,
 }
 
 impl DrawPipeline {
-    /// Makes programs ready.
+    /// Compiles programs.
     ///
     /// # Errors
     /// [`InvalidProgram`] if one of them cannot run on the device.
     pub fn new(level: Level, programs: &DrawPrograms) -> Result<Self, InvalidProgram> {
-        // Without a fragment stage nobody reads varyings.
+        // Without a fragment stage, varyings are not read.
         let varyings = programs.fragment.as_ref().map_or(0, |_| programs.varyings);
         let vertex = VertexProgram::new(level, programs, varyings)?;
         let fragment = programs.fragment.as_ref();
@@ -62,7 +62,7 @@ impl DrawPipeline {
         Ok(Self { vertex, fragment })
     }
 
-    /// Makes a vertex program ready that projects Gaussians; see [`gaussian`](crate::program::interface::gaussian).
+    /// Compiles a vertex program that projects Gaussians; see [`gaussian`](crate::program::interface::gaussian).
     ///
     /// # Errors
     /// [`InvalidProgram`] if it cannot run on the device.
@@ -75,7 +75,7 @@ impl DrawPipeline {
 }
 
 impl VertexProgram {
-    /// `varyings` are those that somebody reads.
+    /// Compiles the vertex program. `varyings` is the number of varyings that are read.
     fn new(level: Level, programs: &DrawPrograms, varyings: u32) -> Result<Self, InvalidProgram> {
         let options = Options {
             lanes: VERTEX_BATCH,
@@ -143,7 +143,7 @@ impl VertexOutputs {
         this
     }
 
-    /// Whether a vertex has more to it than position and varyings, in draws of points or of others.
+    /// True if vertices have outputs besides position and varyings. The point size counts only if `points`.
     pub(crate) fn has_optional(&self, points: bool) -> bool {
         points && self.point_size.is_some()
             || self.layer.is_some()
@@ -151,7 +151,7 @@ impl VertexOutputs {
             || self.has_distances()
     }
 
-    /// Whether there are clip or cull distances.
+    /// True if there are clip or cull distances.
     pub(crate) fn has_distances(&self) -> bool {
         self.clip.iter().chain(&self.cull).any(Option::is_some)
     }

@@ -1,5 +1,5 @@
-//! What fragments make of a colour attachment, 16 at a time: blending or a logic operation, the write mask, and the
-//! attachment's format. Tests hold them against a naive twin of one fragment.
+//! Colour attachments: blends 16 fragments at a time or applies a logic operation, then the write mask, and encodes
+//! them in the attachment's format. Tests compare it with a naive reference for one fragment.
 
 use super::tile::AREA;
 use super::tile_buffer::QuadAddresses;
@@ -10,32 +10,32 @@ use crate::state::{BlendEquation, BlendFactor, BlendOp, BlendState, LogicOp};
 use fearless_simd::{Simd, f32x16, prelude::*, u32x16};
 use isa::Vector;
 
-/// A colour attachment as a draw writes it.
+/// The operations by which a draw writes to a colour attachment.
 #[derive(Clone, Debug)]
 pub struct ColorOutput {
     format: Format,
     codec: Codec,
     equations: Option<(BlendEquation, BlendEquation)>,
-    /// The equations, if there is a kernel for them.
+    /// The kernel for the equations, if there is one.
     over: Option<Over>,
     constants: [f32; 4],
-    /// What sources and constants are clamped to before they are blended.
+    /// The range to which sources and constants are clamped before blending.
     range: Option<(f32, f32)>,
     logic: Option<LogicOp>,
-    /// The bits of a texel that are written, from its first byte on.
+    /// The bits of a texel that are written, as a little-endian number.
     written: u128,
 }
 
-/// The usual equations: a source over the destination.
+/// The usual equations, source over destination, for which there are kernels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Over {
-    /// Of a source that was multiplied by its alpha.
+    /// For a source whose colour is already multiplied by its alpha.
     Premultiplied,
-    /// Of one that was not; alpha is treated as the colours are.
+    /// For a source that is not. Alpha is blended as the colours are.
     Straight,
 }
 
-/// `source * factor + destination * (1 - alpha)`.
+/// The equation `source * factor + destination * (1 - alpha)`.
 const fn over(source: BlendFactor) -> BlendEquation {
     BlendEquation {
         source,
@@ -58,7 +58,7 @@ impl Over {
     }
 }
 
-/// What colours are clamped to before they are blended in a format.
+/// The range to which colours are clamped before they are blended in a format.
 pub(super) fn clamp_range(format: Format) -> Option<(f32, f32)> {
     match format.numeric() {
         Numeric::Unorm | Numeric::Srgb => Some((0.0, 1.0)),
@@ -67,21 +67,21 @@ pub(super) fn clamp_range(format: Format) -> Option<(f32, f32)> {
     }
 }
 
-/// How texels are read and written.
+/// The way texels are read and written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Codec {
-    /// Four bytes of 0 to 1, red first or (`bgra`) blue first.
+    /// Four bytes from 0 to 1, red first or, if `bgra`, blue first.
     Unorm8 { bgra: bool },
-    /// Four words as they are.
+    /// Four 32-bit words, unchanged.
     Words,
-    /// Red's word as it is.
+    /// One 32-bit word for red, unchanged.
     Word,
-    /// By [`Format`]'s rows.
+    /// Converted by [`Format`].
     Other,
 }
 
 impl ColorOutput {
-    /// The output to an attachment of `format`; `None` if it never changes.
+    /// The output to an attachment of `format`; `None` if the state never changes it.
     pub fn new(
         state: &BlendState,
         logic: Option<LogicOp>,
@@ -89,7 +89,7 @@ impl ColorOutput {
         format: Format,
     ) -> Option<Self> {
         let written = written_bits(format, state.write_mask);
-        // An enabled logic operation disables blending even where it does nothing itself.
+        // An enabled logic operation disables blending even for formats to which it does not apply.
         let blends = logic.is_none() && !format.is_integer();
         let logic = logic.filter(|_| {
             matches!(
@@ -124,14 +124,14 @@ impl ColorOutput {
         })
     }
 
-    /// Whether every texel is replaced as a whole, whatever it was.
+    /// True if every texel is replaced as a whole, independent of its old value.
     pub fn overwrites(&self) -> bool {
         self.equations.is_none()
             && self.logic.is_none()
             && self.written == written_bits(self.format, 0xF)
     }
 
-    /// Whether blending takes the second source.
+    /// True if blending uses the second source.
     pub fn is_dual_source(&self) -> bool {
         let dual = |factor| {
             matches!(
@@ -149,7 +149,7 @@ impl ColorOutput {
         })
     }
 
-    /// Blends fragments into the texels of a tile buffer (`words`, its memory).
+    /// Blends fragments into the texels of a tile buffer. `words` is its memory.
     #[inline(always)]
     pub fn write<S: Simd>(
         &self,
@@ -201,8 +201,8 @@ impl ColorOutput {
         }
     }
 
-    /// Blends the fragments of a tile, which are all covered, into its texels: those of a tile buffer (`words`, its memory) from
-    /// `first` on.
+    /// Blends the fragments of a fully covered tile into its texels, from number `first` on in a tile buffer. `words`
+    /// is its memory.
     #[inline(always)]
     pub fn write_tile<S: Simd>(
         &self,
@@ -243,7 +243,7 @@ impl ColorOutput {
         }
     }
 
-    /// The words that replace a tile buffer's texels, whatever those are; `None` if they matter, or aren't words.
+    /// The words that replace a tile buffer's texels; `None` if the old texels matter, or texels are not words.
     #[inline(always)]
     pub fn replacement<S: Simd>(&self, simd: S, source: &Colors<S>) -> Option<[u32; 16]> {
         match self.codec {
@@ -256,7 +256,7 @@ impl ColorOutput {
         }
     }
 
-    /// Texels of four words.
+    /// Blends fragments into texels of four words.
     #[inline(always)]
     fn write_words<S: Simd>(
         &self,
@@ -310,7 +310,7 @@ impl ColorOutput {
         }
     }
 
-    /// Texels of any format.
+    /// Blends fragments into texels of any format.
     #[inline(always)]
     fn write_other<S: Simd>(
         &self,
@@ -366,7 +366,7 @@ impl ColorOutput {
         }
     }
 
-    /// The blend equations.
+    /// Evaluates the blend equations for colour and for alpha.
     #[inline(always)]
     fn blend<S: Simd>(
         &self,
@@ -419,7 +419,7 @@ impl ColorOutput {
     }
 }
 
-/// The components of 16 texels of four words that follow one another.
+/// The components of 16 consecutive texels of four words.
 #[inline(always)]
 fn load_texels<S: Simd>(simd: S, words: &[u32]) -> Colors<S> {
     let load = |at: usize| floats_of(u32x16::from_slice(simd, &words[at..at + 16]));
@@ -429,7 +429,7 @@ fn load_texels<S: Simd>(simd: S, words: &[u32]) -> Colors<S> {
     [r, g, b, a]
 }
 
-/// Stores components as 16 texels of four words that follow one another.
+/// Stores components as 16 consecutive texels of four words.
 #[inline(always)]
 fn store_texels<S: Simd>([r, g, b, a]: &Colors<S>, words: &mut [u32]) {
     let ((rb, rb_later), (ga, ga_later)) = (r.interleave(*b), g.interleave(*a));
@@ -441,7 +441,7 @@ fn store_texels<S: Simd>([r, g, b, a]: &Colors<S>, words: &mut [u32]) {
     bits_of(fourth).store_slice(&mut words[48..64]);
 }
 
-/// A source of 16 fragments; components that are not written are 0.
+/// A source of 16 fragments. Components that the program does not write are 0.
 #[inline(always)]
 pub fn load<S: Simd>(simd: S, source: &[&[Vector]; 4], chunk: usize) -> Colors<S> {
     let mut color = [f32x16::splat(simd, 0.0); 4];
@@ -453,7 +453,7 @@ pub fn load<S: Simd>(simd: S, source: &[&[Vector]; 4], chunk: usize) -> Colors<S
     color
 }
 
-/// What blend equations are about.
+/// The operands of blend equations.
 struct Operands<S: Simd> {
     source: Colors<S>,
     second: Colors<S>,
@@ -462,7 +462,7 @@ struct Operands<S: Simd> {
 }
 
 impl<S: Simd> Operands<S> {
-    /// One component's equation.
+    /// Evaluates the equation of one component.
     #[inline(always)]
     fn evaluate(&self, simd: S, equation: BlendEquation, component: usize) -> f32x16<S> {
         let (s, d) = (self.source[component], self.destination[component]);
@@ -484,7 +484,7 @@ impl<S: Simd> Operands<S> {
         }
     }
 
-    /// A value times its factor. A factor of zero removes it whatever it is, infinities and NaNs included.
+    /// A value times its factor. A factor of zero gives zero even for infinities and NaN.
     #[inline(always)]
     fn term(&self, simd: S, value: f32x16<S>, by: BlendFactor, component: usize) -> f32x16<S> {
         match by {
@@ -523,8 +523,8 @@ impl<S: Simd> Operands<S> {
     }
 }
 
-/// Blends components of 0 to 1 by equations of which there is a kernel; exceeds that only by rounding. What is stored has
-/// the bits that [`ColorOutput::blend`] leads to.
+/// Blends components, clamped to 0 to 1, by one of the usual equations. The result may exceed 1 by rounding only. Stored texels
+/// have the same bits as with [`ColorOutput::blend`].
 #[inline(always)]
 fn blend_over_in_range<S: Simd>(
     simd: S,
@@ -538,7 +538,7 @@ fn blend_over_in_range<S: Simd>(
     }
     let mut blended = blend_over(simd, over, &source, destination);
     if over == Over::Premultiplied {
-        // The source may be brighter than its alpha allows.
+        // The source may be brighter than its alpha permits.
         for component in &mut blended {
             *component = component.min(1.0);
         }
@@ -546,7 +546,7 @@ fn blend_over_in_range<S: Simd>(
     blended
 }
 
-/// Blends by equations of which there is a kernel.
+/// Blends by one of the usual equations, without clamping.
 #[inline(always)]
 fn blend_over<S: Simd>(
     simd: S,
@@ -566,7 +566,7 @@ fn blend_over<S: Simd>(
     blended
 }
 
-/// The texels of 16 lanes.
+/// Decodes the texels of 16 lanes.
 #[inline(never)]
 fn decode(format: Format, bytes: &[u8], quads: &QuadAddresses) -> [[f32; 4]; 16] {
     let size = format.texel_size();
@@ -583,7 +583,7 @@ fn transpose(texels: [[f32; 4]; 16]) -> [[f32; 16]; 4] {
     std::array::from_fn(|component| texels.map(|texel| texel[component]))
 }
 
-/// The bits of a texel that a write mask lets through.
+/// The bits of a texel that a write mask enables.
 fn written_bits(format: Format, write_mask: u8) -> u128 {
     let (mut bits, mut shift) = (0, 0);
     for &Component {
@@ -594,7 +594,7 @@ fn written_bits(format: Format, write_mask: u8) -> u128 {
         let written = channel
             .register()
             .is_some_and(|register| write_mask >> register & 1 == 1);
-        // The shared exponent belongs to all components, which can be written only together.
+        // The shared exponent belongs to all components, so that they can only be written together.
         if written || channel.register().is_none() && write_mask & 7 == 7 {
             bits |= (u128::MAX >> (128 - width)) << shift;
         }
@@ -603,7 +603,7 @@ fn written_bits(format: Format, write_mask: u8) -> u128 {
     bits
 }
 
-/// A logic operation on all bits.
+/// A logic operation, applied bit by bit.
 fn logic(op: LogicOp, s: u128, d: u128) -> u128 {
     match op {
         LogicOp::Clear => 0,

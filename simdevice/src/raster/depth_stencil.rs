@@ -1,6 +1,6 @@
 //! Depth and stencil tests (Vulkan 1.3, 27.10 to 27.14).
 //!
-//! Depths are compared as the numbers that the attachment's format holds: the code of a normalised format, the bits of a
+//! Depths are compared in the encoding of the attachment: the integer of a normalised format, or the bits of a
 //! floating-point one, which are ordered as the numbers are because depth is clamped to 0 to 1.
 
 use crate::format::Format;
@@ -13,16 +13,16 @@ use fearless_simd::{Simd, mask32x16, u32x16};
 #[derive(Clone, Copy, Debug)]
 pub struct Tests {
     pub code: DepthEncoding,
-    /// Comparison and whether depth is written.
+    /// The comparison, and true if depth is written.
     pub depth: Option<(CompareOp, bool)>,
-    /// The least and greatest stored depth.
+    /// The least and the greatest stored depth of the depth-bounds test.
     pub bounds: Option<[u32; 2]>,
-    /// Front and back.
+    /// The stencil state of front and of back faces.
     pub stencil: Option<[StencilFace; 2]>,
 }
 
 impl Tests {
-    /// The tests that attachments of these formats leave of a state.
+    /// The tests of a state that have an effect with attachments of these formats.
     pub fn new(state: &DepthStencil, depth: Option<Format>, stencil: bool) -> Self {
         let code = depth.map_or(DepthEncoding::Float, DepthEncoding::of);
         Self {
@@ -39,17 +39,17 @@ impl Tests {
         }
     }
 
-    /// Whether there is anything to do.
+    /// True if there is any test.
     pub fn any(&self) -> bool {
         self.reads_depth() || self.stencil.is_some()
     }
 
-    /// Whether the depth attachment is needed.
+    /// True if the depth attachment is needed.
     pub fn reads_depth(&self) -> bool {
         self.depth.is_some() || self.bounds.is_some()
     }
 
-    /// Whether an attachment may change.
+    /// True if an attachment may change.
     pub fn writes(&self) -> bool {
         self.depth.is_some_and(|(_, write)| write)
             || self.stencil.is_some_and(|faces| {
@@ -60,8 +60,8 @@ impl Tests {
             })
     }
 
-    /// Those that fragments of a draw which may still be discarded, or not, can fail for good before they are shaded:
-    /// what is stored only ever comes nearer.
+    /// The test that can reject fragments before shading although shading may discard them; `None` if there is none.
+    /// Stored depths then move in one direction only, so that a fragment that fails now would also fail later.
     pub fn filter(&self) -> Option<Self> {
         let (compare, _) = self.depth?;
         let monotonic = matches!(
@@ -78,7 +78,7 @@ impl Tests {
         })
     }
 
-    /// Whether no depth from `fragments` passes against any from `stored`, each the least and the greatest.
+    /// True if no fragment depth passes against any stored depth. Both are given as the least and the greatest.
     #[inline(always)]
     pub fn hides(&self, fragments: [u32; 2], stored: [u32; 2]) -> bool {
         match self.depth {
@@ -90,8 +90,8 @@ impl Tests {
         }
     }
 
-    /// Tests 16 samples that have stored `depths` and `stencils`; returns the lanes of `lanes` that pass. What is to
-    /// be stored replaces `depths` and `stencils` in lanes of `lanes` only, unless `dry`.
+    /// Tests 16 samples that have stored `depths` and `stencils`, and returns the lanes of `lanes` that pass. Replaces
+    /// `depths` and `stencils` by the values to store, in lanes of `lanes` only.
     #[inline(always)]
     pub fn test<S: Simd>(
         &self,
@@ -129,7 +129,7 @@ impl Tests {
     }
 }
 
-/// `fragment op stored`.
+/// The lanes for which `fragment op stored` is true.
 #[inline(always)]
 fn compare_vectors<S: Simd>(
     simd: S,
@@ -160,7 +160,7 @@ fn test_stencil(face: &StencilFace, lanes: u16, stencils: &[u8; 16]) -> u16 {
     passed & lanes
 }
 
-/// Does what the tests' results ask for.
+/// Applies the stencil operations that the tests' results select.
 fn update_stencil(
     face: &StencilFace,
     lanes: u16,
@@ -184,7 +184,7 @@ fn update_stencil(
     }
 }
 
-/// What becomes of a stencil value.
+/// The result of a stencil operation.
 pub fn apply(op: StencilOp, stencil: u8, reference: u8) -> u8 {
     match op {
         StencilOp::Keep => stencil,

@@ -1,4 +1,4 @@
-//! The tile engine: tile buffers, the rasterizer's modes and what becomes of their fragments.
+//! The tile engine: tile buffers, the rasterizer's triangle and Gaussian modes, and the output of fragments.
 
 mod color;
 mod depth_stencil;

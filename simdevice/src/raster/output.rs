@@ -1,4 +1,4 @@
-//! Where fragments of both modes go: tile buffers, attachments, and the sources of their colours.
+//! The outputs that both modes share: tile buffers, attachments, and the sources of fragments' colours.
 
 use crate::program::fragment::FragmentStage;
 use crate::raster::color::ColorOutput;
@@ -10,10 +10,10 @@ use fearless_simd::prelude::*;
 use isa::Vector;
 use isa::machine::Machine;
 
-/// The components of both sources of an attachment, by chunk; those that are not written are empty.
+/// The components of both sources of an attachment, by chunk of 16 lanes. Components that are not written are empty.
 pub type Sources<'a> = [[&'a [Vector]; 4]; 2];
 
-/// The lanes that alpha covers, by sample of a pixel's.
+/// The lanes that alpha to coverage covers, for each sample of a pixel.
 #[inline(always)]
 pub fn covered_by_alpha<S: Simd>(simd: S, alpha: &Vector, samples: usize) -> [u16; 4] {
     let alpha = as_floats(simd, alpha);
@@ -27,7 +27,7 @@ pub fn covered_by_alpha<S: Simd>(simd: S, alpha: &Vector, samples: usize) -> [u1
     covered
 }
 
-/// What a program wrote to a slot, if there is one.
+/// The values that a program wrote to a slot; empty without a slot.
 pub fn lanes_of(machine: &Machine, slot: Option<u32>) -> &[Vector] {
     slot.map_or(&[], |slot| machine.output_vectors(slot))
 }
@@ -48,7 +48,7 @@ pub struct Targets<'a> {
     pub stencil: Option<&'a Target>,
 }
 
-/// What becomes of the attachments that a program writes to.
+/// The outputs to the attachments that a program writes to.
 pub(super) fn color_outputs(
     stage: Option<&FragmentStage>,
     targets: &[Option<Target>],

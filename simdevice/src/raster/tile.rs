@@ -1,7 +1,7 @@
 //! Tiles: 16x16 pixels of a macro-tile, and the order of their pixels in tile buffers.
 //!
-//! Pixels are kept in an order in which 2x2 quads are consecutive, then 4x4 blocks, then rows of blocks, so that a quad
-//! is four lanes of a vector and a block all sixteen.
+//! Pixels are stored in an order in which 2x2 quads are consecutive, then 4x4 blocks, then rows of blocks. A quad is
+//! four lanes of a vector, and a block is all sixteen.
 
 pub use crate::limits::MAX_FRAMEBUFFER_SIZE;
 use crate::limits::{MAX_MACRO_TILE_SIZE, TILE_SIZE};
@@ -9,12 +9,12 @@ use crate::state::Rect;
 
 /// The side of a tile in pixels.
 pub const SIDE: usize = TILE_SIZE as usize;
-/// Pixels of a tile.
+/// The number of pixels of a tile.
 pub const AREA: usize = SIDE * SIDE;
-// A tile buffer keeps a bit per tile.
+// A tile buffer has one bit per tile in a 64-bit word.
 const _: () = assert!((MAX_MACRO_TILE_SIZE / TILE_SIZE).pow(2) <= u64::BITS);
 
-/// Where the pixel at (x, y) from a tile's corner stands in the tile.
+/// The index in the tile of the pixel at (x, y) from its corner.
 #[inline(always)]
 pub const fn place(x: usize, y: usize) -> usize {
     (x & 1) | (y & 1) << 1 | (x & 2) << 1 | (y & 2) << 2 | (x & 12) << 2 | (y & 12) << 4
@@ -23,11 +23,11 @@ pub const fn place(x: usize, y: usize) -> usize {
 /// A tile of a macro-tile: its index there, and the pixels of it that the pass may touch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Tile {
-    /// Row by row within the macro-tile.
+    /// The index in the macro-tile, row by row.
     pub index: usize,
-    /// Column and row in tiles from the framebuffer's corner.
+    /// The column and row in tiles from the framebuffer's corner.
     pub at: [u32; 2],
-    /// The pixels that the pass may touch; never empty, never left of or above the framebuffer.
+    /// The pixels that the pass may touch. Never empty, and never left of or above the framebuffer.
     pub pixels: Rect,
 }
 
@@ -56,7 +56,7 @@ impl Tile {
         })
     }
 
-    /// Rows of `rect` within this tile's pixels: y, and the columns, both in pixels from the tile's corner.
+    /// The rows of `rect` that lie in this tile's pixels: y, and the columns, both in pixels from the tile's corner.
     pub fn rows(&self, rect: Rect) -> impl Iterator<Item = (usize, std::ops::Range<usize>)> {
         let part = self.pixels.intersect(rect);
         let inside = |at: i32| (at as u32 % TILE_SIZE) as usize;
@@ -77,7 +77,7 @@ impl Tile {
 /// Vulkan's standard sample positions of 4 samples, in 1/256 pixels.
 pub const SAMPLES_4: [[i32; 2]; 4] = [[96, 32], [224, 96], [32, 160], [160, 224]];
 
-/// The only sample of a pixel is at its centre, in 1/256 pixels.
+/// The position of the only sample of a pixel, its centre, in 1/256 pixels.
 pub const CENTER: [[i32; 2]; 1] = [[128, 128]];
 
 /// The column of each lane of a block.
@@ -86,7 +86,8 @@ pub const LANE_X: [i32; 16] = lanes(0);
 /// The row of each lane of a block.
 pub const LANE_Y: [i32; 16] = lanes(1);
 
-/// The pixels of a block lane by lane: bits 0 and 2 of a lane are its column, 1 and 3 its row.
+/// The coordinates of a block's pixels along an axis, lane by lane: bits 0 and 2 of a lane are its column, 1 and 3 its
+/// row.
 const fn lanes(axis: usize) -> [i32; 16] {
     let mut out = [0; 16];
     let mut lane = 0;
@@ -104,7 +105,7 @@ pub const BLOCK_X: [i32; 16] = [0, 4, 8, 12, 0, 4, 8, 12, 0, 4, 8, 12, 0, 4, 8, 
 /// The row of the first pixel of each block of a tile, from the tile's corner.
 pub const BLOCK_Y: [i32; 16] = [0, 0, 0, 0, 4, 4, 4, 4, 8, 8, 8, 8, 12, 12, 12, 12];
 
-/// Blocks of a tile.
+/// The number of blocks of a tile.
 pub(super) const BLOCKS: usize = 16;
 
 /// The first pixel of a block of the tile at pixel `at`.

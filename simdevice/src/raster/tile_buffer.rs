@@ -1,10 +1,11 @@
-//! Tile buffers: a macro-tile's piece of an attachment, where quads lie in it, and where it is loaded from and stored to.
+//! Tile buffers: a macro-tile's part of an attachment, the addresses of quads in it, and the loading and storing of
+//! tiles.
 //!
-//! A tile (16x16 pixels) of an attachment is loaded or cleared when a draw first touches it, and stored if it was;
-//! what no draw touches is never loaded, and cleared only in memory. Texels are held as the bytes that they are in
-//! memory, so that a store and a load in the middle of a pass change nothing; depths as the number that their format
-//! holds (see [`super::depth_stencil`]). Tiles rather than macro-tiles are loaded and stored, so that the size of a macro-tile
-//! changes nothing either.
+//! A tile (16x16 pixels) of an attachment is loaded or cleared when a draw first touches it, and is stored only then. A
+//! tile that no draw touches is never loaded, and cleared only in memory. Texels have the same bytes as in memory, so
+//! that a store and a load in the middle of a pass change nothing. Depths are in their format's encoding (see
+//! [`super::depth_stencil`]). Tiles rather than macro-tiles are loaded and stored, so that the result is independent of
+//! the size of macro-tiles.
 
 use super::tile::{AREA, SIDE, Tile, place};
 use crate::format::unorm8::{pack_unorm8, unorm8_fraction};
@@ -22,30 +23,30 @@ use std::sync::Arc;
 /// The most samples of a pixel.
 const SAMPLES: usize = MAX_SAMPLES as usize;
 
-/// One attachment's texels of a macro-tile: by tile, then sample, then pixel (see [`place`]).
+/// The texels of one attachment in a macro-tile: by tile, then sample, then pixel (see [`place`]).
 #[derive(Debug, Default)]
 pub struct TileBuffer {
-    /// Bytes, kept in words so that texels of words are aligned.
+    /// The texels' bytes. They are stored as words for alignment.
     words: Vec<u32>,
-    /// Bytes of a texel here.
+    /// The bytes of a texel in the buffer.
     stride: usize,
     samples: usize,
-    /// Bit `index` tells that the tile was loaded or cleared here.
+    /// A bit for each tile: 1 if the tile was loaded or cleared here.
     touched: u64,
-    /// Bit `index` tells that the tile's entry of `ranges` is true.
+    /// A bit for each tile: 1 if its element of `ranges` is valid.
     ranged: u64,
     /// The least and the greatest word of each tile.
     ranges: Vec<[u32; 2]>,
 }
 
-/// A texel in the tile buffer and in memory.
+/// The difference between a texel in the tile buffer and in memory.
 #[derive(Clone, Copy, Debug)]
 enum Kind {
-    /// The same bytes.
+    /// The bytes are the same.
     Same,
-    /// A 16-bit depth, here in a word.
+    /// A 16-bit depth, which has 32 bits in the buffer.
     Depth16,
-    /// A 24-bit depth in a word whose upper bits are unused.
+    /// A 24-bit depth in 32 bits, of which the upper ones are unused in memory.
     Depth24,
 }
 
@@ -59,7 +60,7 @@ impl Kind {
     }
 }
 
-/// Bytes of a texel of `format` in a tile buffer.
+/// The bytes of a texel of `format` in a tile buffer.
 fn stride(format: Format) -> usize {
     match Kind::of(format) {
         Kind::Same => format.texel_size(),
@@ -67,7 +68,7 @@ fn stride(format: Format) -> usize {
     }
 }
 
-/// A texel's bytes in memory as those in a tile buffer; `bytes` begins with the former.
+/// The bytes in a tile buffer of a texel whose bytes in memory are at the beginning of `bytes`.
 fn unpack(format: Format, bytes: &[u8]) -> [u8; MAX_TEXEL_SIZE] {
     let mut texel = [0; MAX_TEXEL_SIZE];
     let size = match Kind::of(format) {
@@ -80,7 +81,7 @@ fn unpack(format: Format, bytes: &[u8]) -> [u8; MAX_TEXEL_SIZE] {
 }
 
 impl TileBuffer {
-    /// A buffer for macro-tiles of `size` pixels of a target.
+    /// A buffer for macro-tiles of `size` x `size` pixels of a target.
     pub fn new(size: u32, target: Option<&Target>) -> Self {
         let Some(target) = target else {
             return Self::default();
@@ -97,43 +98,43 @@ impl TileBuffer {
         }
     }
 
-    /// Whether a tile was loaded or cleared.
+    /// True if a tile was loaded or cleared.
     #[inline]
     pub fn is_touched(&self, tile: usize) -> bool {
         self.touched >> tile & 1 == 1
     }
 
-    /// Samples of a pixel.
+    /// The number of samples of a pixel.
     #[inline(always)]
     pub fn samples(&self) -> usize {
         self.samples
     }
 
-    /// The first texel of a sample of a tile.
+    /// The index of the first texel of a sample of a tile.
     #[inline(always)]
     pub fn start(&self, tile: usize, sample: usize) -> usize {
         (tile * self.samples + sample) * AREA
     }
 
-    /// All texels' bytes.
+    /// The bytes of all texels.
     #[inline(always)]
     pub fn bytes_mut(&mut self) -> &mut [u8] {
         bytemuck::cast_slice_mut(&mut self.words)
     }
 
-    /// All texels' words.
+    /// The words of all texels.
     #[inline(always)]
     pub fn words(&self) -> &[u32] {
         &self.words
     }
 
-    /// As [`TileBuffer::words`], to be changed.
+    /// The words of all texels, mutable.
     #[inline(always)]
     pub fn words_mut(&mut self) -> &mut [u32] {
         &mut self.words
     }
 
-    /// Bounds of the words of all samples of a tile.
+    /// The least and the greatest word of all samples of a tile.
     #[inline(always)]
     pub fn range<S: Simd>(&mut self, simd: S, tile: usize) -> [u32; 2] {
         if self.ranged >> tile & 1 == 0 {
@@ -151,7 +152,7 @@ impl TileBuffer {
         self.ranges[tile]
     }
 
-    /// Tells that words of a tile have changed.
+    /// Invalidates the range of a tile whose words have changed.
     #[inline(always)]
     pub fn changed(&mut self, tile: usize) {
         self.ranged &= !(1 << tile);
@@ -164,7 +165,7 @@ impl TileBuffer {
         &mut self.bytes_mut()[start * stride..][..AREA * stride]
     }
 
-    /// Loads or clears a tile if this is the first touch.
+    /// Loads or clears a tile if it was not touched yet.
     #[inline]
     pub fn load_or_clear(&mut self, target: &Target, layer: u32, tile: &Tile) {
         if !self.is_touched(tile.index) {
@@ -172,7 +173,7 @@ impl TileBuffer {
         }
     }
 
-    /// Marks a tile as touched whose texels are all overwritten before anybody reads them.
+    /// Marks a tile as touched. All its texels must be overwritten before they are read.
     pub fn mark_overwritten(&mut self, tile: usize) {
         self.touched |= 1 << tile;
     }
@@ -207,8 +208,8 @@ impl TileBuffer {
         }
     }
 
-    /// Stores a tile that was touched; clears in memory one that was not, if the pass is to clear it.
-    /// Afterwards no tile of that index is touched.
+    /// Stores a touched tile, if `keep`. Clears an untouched one in memory, if the pass clears it. Afterwards the tile
+    /// is untouched.
     pub fn finish(&mut self, target: &Target, layer: u32, tile: &Tile, keep: bool) {
         let touched = self.is_touched(tile.index);
         self.touched &= !(1 << tile.index);
@@ -233,7 +234,7 @@ impl TileBuffer {
                     get_row(texels, size, y, columns.start, bytes);
                 } else if touched {
                     for (x, out) in columns.zip(bytes.chunks_exact_mut(size)) {
-                        // A depth's bytes are its lower ones.
+                        // The bytes of a depth in memory are the lower ones.
                         out.copy_from_slice(&texels[place(x, y) * stride..][..size]);
                     }
                 }
@@ -242,7 +243,7 @@ impl TileBuffer {
         }
     }
 
-    /// Resolves a tile that was touched: one sample for each of its pixels is written to `resolve`.
+    /// Resolves a touched tile: writes one sample for each of its pixels to `resolve`.
     pub fn resolve(
         &mut self,
         level: Level,
@@ -300,7 +301,7 @@ impl TileBuffer {
         }
     }
 
-    /// Sets all samples of the pixels of a tile that lie in `rect` to a texel, given by its bytes in memory.
+    /// Sets all samples of the pixels of a tile that lie in `rect` to a texel, given as its bytes in memory.
     pub fn fill_rect(&mut self, format: Format, tile: &Tile, rect: Rect, texel: &[u8]) {
         let stride = self.stride;
         let texel = unpack(format, texel);
@@ -315,7 +316,7 @@ impl TileBuffer {
     }
 }
 
-/// Whether texels are four bytes of 0 to 1.
+/// True if texels are four bytes from 0 to 1.
 fn is_unorm8(format: Format) -> bool {
     matches!(
         format,
@@ -323,7 +324,7 @@ fn is_unorm8(format: Format) -> bool {
     )
 }
 
-/// The means of a tile's samples of four bytes, as [`resolve_row`] and the format have them.
+/// The means of a tile's samples of four bytes, with the same bits as from [`resolve_row`] and the format.
 #[inline(always)]
 fn unorm8_means<S: Simd>(simd: S, words: &[u32], means: &mut [u32; AREA]) {
     for (block, mean) in means.as_chunks_mut::<16>().0.iter_mut().enumerate() {
@@ -362,7 +363,7 @@ fn fill_each<const N: usize>(bytes: &mut [u8], texel: &[u8]) {
     }
 }
 
-/// Copies a row of a tile's sample, from column `first` on, to `row`.
+/// Copies a row of one sample of a tile, from column `first` on, to `row`.
 fn get_row(texels: &[u8], size: usize, y: usize, first: usize, row: &mut [u8]) {
     match size {
         1 => get_each::<1>(texels, y, first, row),
@@ -393,7 +394,7 @@ fn get_each<const N: usize>(texels: &[u8], y: usize, first: usize, row: &mut [u8
     }
 }
 
-/// The inverse of [`get_row`].
+/// Copies `row` to a row of one sample of a tile, from column `first` on.
 fn set_row(texels: &mut [u8], size: usize, y: usize, first: usize, row: &[u8]) {
     match size {
         1 => set_each::<1>(texels, y, first, row),
@@ -424,16 +425,16 @@ fn set_each<const N: usize>(texels: &mut [u8], y: usize, first: usize, row: &[u8
     }
 }
 
-/// Where the quads of 16 lanes are in a tile buffer: texels, from its beginning.
+/// The addresses of the four quads of 16 lanes in a tile buffer, in texels from its beginning.
 #[derive(Clone, Copy, Debug)]
 pub struct QuadAddresses {
     pub first: [usize; 4],
-    /// Whether they follow one another.
+    /// True if the quads are consecutive.
     pub consecutive: bool,
 }
 
 impl QuadAddresses {
-    /// Those of a block, from a texel on.
+    /// The addresses of a block whose first texel is `first`.
     #[inline(always)]
     pub fn block(first: usize) -> Self {
         Self {
@@ -448,16 +449,16 @@ impl QuadAddresses {
         self.first[lane / 4] + lane % 4
     }
 
-    /// The tiles that they are in, of a tile buffer of `samples` samples a pixel.
+    /// The tiles of the quads, in a tile buffer of `samples` samples per pixel.
     #[inline(always)]
     pub fn tiles(&self, samples: usize) -> [usize; 4] {
-        // A power of two.
+        // This is a power of two.
         let shift = (samples * AREA).trailing_zeros();
         let [a, b, c, d] = self.first;
         [a >> shift, b >> shift, c >> shift, d >> shift]
     }
 
-    /// The words of 16 lanes' texels of a word each.
+    /// The texels of 16 lanes, in a tile buffer whose texels are words.
     #[inline(always)]
     pub fn load(&self, words: &[u32]) -> [u32; 16] {
         let mut out = [0; 16];
@@ -471,7 +472,7 @@ impl QuadAddresses {
         out
     }
 
-    /// Sets the texels of some lanes.
+    /// Stores the texels of some lanes.
     #[inline(always)]
     pub fn store(&self, words: &mut [u32], lanes: u16, values: &[u32; 16]) {
         if self.consecutive && lanes == u16::MAX {
@@ -484,7 +485,7 @@ impl QuadAddresses {
                 0 => {}
                 15 => words[*first..][..4].copy_from_slice(values),
                 some => {
-                    // Another quad of the vector may be at the same place with other lanes.
+                    // Another quad of the vector may have the same address and other lanes.
                     let texels = &mut words[*first..][..4];
                     let mask = &QUAD_MASKS[usize::from(some)];
                     for lane in 0..4 {
@@ -496,7 +497,7 @@ impl QuadAddresses {
     }
 }
 
-/// For each set of lanes of a quad: all ones in those.
+/// A mask of words for each set of lanes of a quad: all ones in those lanes.
 const QUAD_MASKS: [[u32; 4]; 16] = {
     let mut masks = [[0; 4]; 16];
     let mut set = 0;
@@ -513,10 +514,10 @@ const QUAD_MASKS: [[u32; 4]; 16] = {
     masks
 };
 
-/// An attachment's view cannot be rendered to.
+/// The reasons why a view cannot be rendered to as an attachment.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum AttachmentError {
-    /// The view's format lacks the aspect, or its texels differ in size from the image's.
+    /// The view's format lacks the aspect, or its texels differ in size from the image's texels.
     #[error("a view of format {0:?} cannot be this attachment")]
     Format(Format),
     /// The image lacks the view's subresource.
@@ -527,32 +528,29 @@ pub enum AttachmentError {
         /// The array layer.
         layer: u32,
     },
-    /// Neither 1 sample per texel nor [`MAX_SAMPLES`].
+    /// The number of samples is neither 1 nor [`MAX_SAMPLES`].
     #[error("attachments of {0} samples cannot be rendered to")]
     Samples(u32),
-    /// Wider or higher than [`MAX_FRAMEBUFFER_SIZE`].
+    /// The image is wider or higher than [`MAX_FRAMEBUFFER_SIZE`].
     #[error("an attachment of {0}x{1} pixels is too large")]
     Extent(u32, u32),
 }
 
-/// One aspect of an attachment: where its texels are, and what a tile begins with.
+/// One aspect of an attachment: the image with its texels, and the load and store operations.
 #[derive(Clone, Debug)]
 pub struct Target {
     image: Arc<Image>,
     format: Format,
-    /// Subresource and z of each layer.
+    /// The subresource and the z coordinate of each layer.
     layers: Vec<(SubresourceLayout, u32)>,
-    /// The bytes of the texel that it is cleared to, until that is done.
+    /// The bytes of the texel to which the attachment is still to be cleared.
     pub clear: Option<[u8; MAX_TEXEL_SIZE]>,
-    /// What becomes of it at the end of the pass.
+    /// The operation at the end of the pass.
     pub store: StoreOp,
 }
 
 impl Target {
-    /// The first `layer_count` layers of `view`, or as many as the image has.
-    ///
-    /// # Errors
-    /// [`AttachmentError`] if the view cannot be rendered to.
+    /// The target of the first `layer_count` layers of `view`, or of as many as the image has.
     pub fn new(
         view: &ImageView,
         aspect: Aspect,
@@ -603,17 +601,17 @@ impl Target {
         })
     }
 
-    /// How its texels are read.
+    /// The format of its texels.
     pub fn format(&self) -> Format {
         self.format
     }
 
-    /// How many layers are rendered to.
+    /// The number of layers that are rendered to.
     pub fn layer_count(&self) -> u32 {
         self.layers.len() as u32
     }
 
-    /// Its width and height in pixels.
+    /// The width and height of the attachment in pixels.
     pub fn extent(&self) -> [u32; 2] {
         self.layers
             .iter()
@@ -622,17 +620,17 @@ impl Target {
             .unwrap_or_default()
     }
 
-    /// Marks its memory as changed.
+    /// Marks the attachment's memory as changed.
     pub fn bump_generation(&self) {
         self.image.memory.bump_generation();
     }
 
-    /// Samples per pixel.
+    /// The number of samples per pixel.
     pub fn samples(&self) -> u32 {
         self.image.desc.samples
     }
 
-    /// One sample of all texels of a layer, if the attachment has that.
+    /// One sample of all texels of a layer, if the attachment has it.
     pub(super) fn sample(&self, layer: u32, sample: u32) -> Option<SampleRows<'_>> {
         let (layout, z) = self.layers.get(layer as usize)?;
         Some(SampleRows {
@@ -651,17 +649,17 @@ pub(super) struct SampleRows<'a> {
 }
 
 impl SampleRows<'_> {
-    /// Reads the bytes of texels from pixel (x, y) on; they stay as they are where there are none.
+    /// Reads the bytes of texels from pixel (x, y) on. Bytes outside of the image stay unchanged.
     #[inline]
     pub fn read(&self, [x, y]: [u32; 2], bytes: &mut [u8]) {
         // Tiles are clipped to the attachments before they are rendered.
         let _ = self.image.read_row(&self.layout, [x, y, self.z], bytes);
     }
 
-    /// Writes the bytes of texels from pixel (x, y) on, where there are any.
+    /// Writes the bytes of texels from pixel (x, y) on. Those outside of the image are not written.
     #[inline]
     pub fn write(&self, [x, y]: [u32; 2], bytes: &[u8]) {
-        // As above.
+        // Tiles are clipped here, too.
         let _ = self.image.write_row(&self.layout, [x, y, self.z], bytes);
     }
 }

@@ -1,9 +1,10 @@
-//! Powers of two, 16 at a time: by a table and a short polynomial where processors look words up, by a longer one elsewhere.
+//! Powers of two, 16 at a time: by a table and a short polynomial on processors that look up words in vectors,
+//! otherwise by a longer polynomial.
 
 use crate::simd::{bits_of, floats_of};
 use fearless_simd::{Simd, f32x16, prelude::*};
 
-/// A polynomial fitted to 2^f for f in [-1/2, 1/2], highest power first; relative error 9.2e-8.
+/// A polynomial fitted to 2^f for f in [-1/2, 1/2], highest power first. Its relative error is 9.2e-8.
 #[allow(
     clippy::approx_constant,
     reason = "the coefficients are fitted; one comes near ln 2"
@@ -17,38 +18,38 @@ pub(crate) const POWER_OF_TWO: [f32; 6] = [
     1.0,
 ];
 
-/// A polynomial for powers of two of fewer terms.
+/// A polynomial with fewer terms for powers of two.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Powers<const TERMS: usize> {
-    /// Fitted to 2^f for f in [-1/2, 1/2] in relative error, highest power first.
+    /// The coefficients, highest power first, fitted to 2^f for f in [-1/2, 1/2] for the least relative error.
     pub(crate) coefficients: [f32; TERMS],
-    /// No result's relative error is greater, rounding included.
+    /// A bound of the results' relative error, rounding included.
     pub(crate) error: f32,
 }
 
-/// Of degree 3.
+/// The polynomial of degree 3.
 pub(crate) const CUBIC: Powers<4> = Powers {
     coefficients: [0.055_171_67, 0.242_611_13, 0.693_260_97, 0.999_928_06],
     error: 7.6e-5,
 };
 
-/// Of degree 2.
+/// The polynomial of degree 2.
 pub(crate) const QUADRATIC: Powers<3> = Powers {
     coefficients: [0.238_428_94, 0.703_448, 1.000_443_1],
     error: 1.73e-3,
 };
 
 impl<const TERMS: usize> Powers<TERMS> {
-    /// As [`exp2_of_negated`], with this polynomial, for `x` up to 125.9: at the end of the range it may be a little less than a
-    /// normal number. Fast kernels have no floor so low.
+    /// The result of [`exp2_of_negated`] with this polynomial, for `x` up to 125.9. At the end of the range it may be
+    /// slightly less than a normal number. Fast kernels have no floor so low.
     #[inline(always)]
     pub(crate) fn of_negated<S: Simd>(&self, simd: S, x: f32x16<S>) -> f32x16<S> {
         by_polynomial(simd, x, &self.coefficients)
     }
 }
 
-/// 2 to the power of `-x`, for `x` between -126 and 126; elsewhere the result means nothing. Error: at most 1.95 ulp by the
-/// table of 32 words, 1.35 ulp by that of 8, 2.1 ulp by the polynomial (measured).
+/// 2 to the power of `-x`, for `x` between -126 and 126; undefined elsewhere. The error is at most 1.95 ulp with the
+/// table of 32 words, 1.35 ulp with that of 8, and 2.1 ulp with the polynomial (measured).
 #[inline(always)]
 pub(crate) fn exp2_of_negated<S: Simd>(simd: S, x: f32x16<S>) -> f32x16<S> {
     match devmem::places(simd.level()) {
@@ -58,16 +59,17 @@ pub(crate) fn exp2_of_negated<S: Simd>(simd: S, x: f32x16<S>) -> f32x16<S> {
     }
 }
 
-/// Powers of two by a table of those of fractions, and a polynomial for what is between them.
+/// The table and the polynomial for powers of two: the table has powers of fractions `j / PLACES`, and the polynomial
+/// interpolates.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Table<const PLACES: usize, const TERMS: usize> {
-    /// The bits of 2^(j/PLACES) for each j, less those of j parts of the exponent's unit.
+    /// The bits of 2^(j/PLACES) for each j, minus j times the exponent's unit divided by `PLACES`.
     pub(crate) words: [u32; PLACES],
-    /// A polynomial fitted to (2^f - 1) / f for f up to half a part, highest power first.
+    /// A polynomial fitted to (2^f - 1) / f for |f| up to half of 1/PLACES, highest power first.
     pub(crate) growth: [f32; TERMS],
 }
 
-/// What the polynomial leaves of 2^f is a relative error of 2.7e-8.
+/// The table of 8 words. The relative error of the polynomial for 2^f is 2.7e-8.
 pub(crate) const EIGHTHS: Table<8, 3> = Table {
     words: [
         0x3f80_0000,
@@ -82,7 +84,7 @@ pub(crate) const EIGHTHS: Table<8, 3> = Table {
     growth: [0.055_496_22, 0.240_257_65, 0.693_147_24],
 };
 
-/// What the polynomial leaves of 2^f is a relative error of 5.4e-8.
+/// The table of 32 words. The relative error of the polynomial for 2^f is 5.4e-8.
 pub(crate) const THIRTY_SECONDS: Table<32, 2> = Table {
     words: [
         0x3f80_0000,
@@ -121,8 +123,8 @@ pub(crate) const THIRTY_SECONDS: Table<32, 2> = Table {
     growth: [0.240_226_49, 0.693_157_3],
 };
 
-/// 2 to the power of `-x = n + j / PLACES + f`. It takes no more instructions than the long polynomial, and fewer that wait for
-/// one another.
+/// 2 to the power of `-x = n + j / PLACES + f`, by a table. It takes no more instructions than the long polynomial, and
+/// its chain of dependent instructions is shorter.
 #[inline(always)]
 fn by_table<S: Simd, const PLACES: usize, const TERMS: usize>(
     simd: S,
@@ -130,7 +132,7 @@ fn by_table<S: Simd, const PLACES: usize, const TERMS: usize>(
     table: &Table<PLACES, TERMS>,
 ) -> f32x16<S> {
     let constant = |value| f32x16::splat(simd, value);
-    // Adding 1.5 * 2^23 parts rounds to parts, of which the low bits then count how many there are.
+    // Adding 1.5 * 2^23 / PLACES rounds to multiples of 1/PLACES, whose number is then in the low bits.
     let shifter = constant(12_582_912.0 / PLACES as f32);
     let shifted = shifter - x;
     let f = (shifter - shifted) - x;
@@ -152,7 +154,7 @@ fn by_polynomial<S: Simd, const TERMS: usize>(
     coefficients: &[f32; TERMS],
 ) -> f32x16<S> {
     let constant = |value| f32x16::splat(simd, value);
-    // Adding 1.5 * 2^23 rounds to an integer, which then stands in the low bits.
+    // Adding 1.5 * 2^23 rounds to an integer, which is then in the low bits.
     let shifter = constant(12_582_912.0);
     let shifted = shifter - x;
     let f = (shifter - shifted) - x;

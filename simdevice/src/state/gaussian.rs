@@ -1,43 +1,46 @@
-//! The state of Gaussian draws: the camera, and what an extension's pipeline fixes.
+//! The state of Gaussian draws: the camera, and the state that the extension's pipelines fix.
 
 use crate::state::{BlendState, DepthStencil, LogicOp};
 
-/// How a Gaussian draw's camera projects.
+/// The projection of a Gaussian draw's camera.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum CameraModel {
-    /// Perspective with a principal point anywhere.
+    /// Perspective projection, whose principal point may be anywhere.
     Pinhole,
-    /// Parallel: focal lengths are pixels per unit of length.
+    /// Parallel projection. Focal lengths are in pixels per unit of length.
     Orthographic,
-    /// Equidistant: focal lengths are pixels per radian from the axis.
+    /// Equidistant fisheye projection. Focal lengths are in pixels per radian from the axis.
     Fisheye,
-    /// Longitude and latitude: focal lengths are pixels per radian. Pictures repeat after a period of a whole turn.
+    /// Projection to longitude and latitude. Focal lengths are in pixels per radian. The image repeats after a whole
+    /// turn.
     Equirectangular,
 }
 
 /// The camera of a Gaussian draw: +x right, +y down, +z forward.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// How it projects.
+    /// The projection.
     pub model: CameraModel,
-    /// World to camera, row-major.
+    /// The rotation from world to camera space, row-major.
     pub rotation: [f32; 9],
-    /// The eye in world units; double, so that scenes far from the origin lose nothing.
+    /// The eye in world units. It is binary64, so that scenes far from the origin keep their precision.
     pub eye: [f64; 3],
     /// Focal lengths in pixels.
     pub focal_length: [f32; 2],
-    /// The principal point in pixels from the viewport's corner.
+    /// The principal point in pixels from the viewport's corner (`x`, `y`).
     pub principal_point: [f32; 2],
-    /// Gaussians must lie beyond this depth variable, in world units; greater than 0 unless the camera is orthographic.
+    /// The depth variable, in world units, beyond which Gaussians must be. It is greater than 0 unless the camera is
+    /// orthographic.
     pub near_plane: f32,
-    /// Gaussians must lie before this depth, in world units; may be infinite.
+    /// The depth variable, in world units, before which Gaussians must be. It may be infinite.
     pub far_plane: f32,
-    /// Fragment depth is `c0 + c1 / z`, or `c0 + c1 z` for an orthographic camera, with the depth variable z.
+    /// The coefficients c0 and c1 of the fragment depth `c0 + c1 / z`, or `c0 + c1 z` for an orthographic camera, where
+    /// z is the depth variable.
     pub depth_coefficients: [f32; 2],
 }
 
 impl Default for Camera {
-    /// At the origin, with focal lengths of one pixel, 3DGS's planes and a depth of 0.
+    /// A pinhole camera at the origin, with focal lengths of one pixel, 3DGS's planes and a depth of 0.
     fn default() -> Self {
         Self {
             model: CameraModel::Pinhole,
@@ -52,98 +55,103 @@ impl Default for Camera {
     }
 }
 
-/// What Gaussians are sorted by.
+/// The key that Gaussians are sorted by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum GaussianOrder {
-    /// The centre's depth variable: camera-space z, or the distance for a fisheye and a panorama.
+    /// The centre's depth variable: camera-space z, or the distance from the eye for fisheye and equirectangular
+    /// cameras.
     ViewDepth,
     /// The centre's distance from the eye.
     RadialDistance,
-    /// Nothing: the order of the draw.
+    /// No key. Gaussians stay in the order of the draw.
     Primitive,
-    /// At each pixel, the depth at which the Gaussian is greatest on the pixel's ray.
+    /// The depth, separately for each pixel, at which the Gaussian is greatest along the pixel's ray.
     PerPixel,
 }
 
-/// What a Gaussian is in space.
+/// The shape of a Gaussian in space.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum GaussianGeometry {
-    /// A volume with three standard deviations, whose picture is approximated by an ellipse's.
+    /// A volume with three standard deviations. Its projection is approximated by an ellipse.
     Volume,
-    /// A flat disc with two, whose picture is exact. Not for fisheyes.
+    /// A flat disc with two standard deviations, whose projection is exact. It is for pinhole and orthographic cameras
+    /// only.
     Surfel,
 }
 
 /// The rasterizer's arithmetic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum GaussianPrecision {
-    /// binary32, or better.
+    /// binary32, or more precise.
     Float32,
-    /// Every operation of a processing element is rounded to binary16. Only for volumes, and not in the per-pixel order.
+    /// Every operation of a processing element is rounded to binary16. It is for volumes only, and not for the
+    /// per-pixel order.
     Float16,
 }
 
-/// How a Gaussian in space becomes one in the picture.
+/// The method that projects the covariance of a Gaussian.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum GaussianLinearization {
-    /// By the camera's Jacobian at the mean.
+    /// The camera's Jacobian at the mean.
     #[default]
     Jacobian,
-    /// By the mean and the covariance of seven points, where a camera sees all of them.
+    /// The unscented transform: the mean and the covariance of seven projected points. Where the camera does not see
+    /// all of them, the Jacobian is used.
     Unscented,
 }
 
-/// What Gaussians may be drawn the cheaper for. Both are permissions: what has no use for one is exact. By default
-/// nothing may be.
+/// Errors that are permitted in exchange for speed. A stage that gains nothing from them is exact. By default none are
+/// permitted.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct GaussianApproximation {
-    /// The greatest relative error of the exponential that alpha is made of, 0 to 1. Whether alpha reaches its floor is
-    /// decided without it.
+    /// The greatest relative error, 0 to 1, of the exponential in alpha. The comparison of alpha with its floor does
+    /// not depend on it.
     pub exponential_error: f32,
-    /// What the contributions that are left out at a pixel may add up to, 0 to 1: the transmittance in front of each,
-    /// times its alpha.
+    /// The greatest sum of contributions that may be omitted at a pixel, 0 to 1. A contribution is the transmittance in
+    /// front of a Gaussian times the Gaussian's alpha.
     pub contribution_budget: f32,
 }
 
-/// The state of a Gaussian draw that its pipeline fixes. See the extension for each value's meaning.
+/// The state of a Gaussian draw that its pipeline fixes. The extension's text defines each value.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GaussianState {
-    /// The spherical harmonics degree drawn, 0 to 3.
+    /// The spherical harmonics degree that is evaluated, 0 to 4.
     pub sh_degree: u32,
-    /// How they are projected.
+    /// The method that projects covariances.
     pub linearization: GaussianLinearization,
     /// The rasterizer's arithmetic.
     pub precision: GaussianPrecision,
-    /// What the Gaussians are.
+    /// The shape of the Gaussians.
     pub geometry: GaussianGeometry,
-    /// What the Gaussians are sorted by.
+    /// The key that the Gaussians are sorted by.
     pub order: GaussianOrder,
-    /// Whether opacity is scaled by the ratio of determinants, so that the low-pass filter conserves energy.
+    /// True if opacity is multiplied by a ratio of determinants, so that the low-pass filter conserves energy.
     pub opacity_compensated: bool,
-    /// Added to both diagonal elements of the screen-space covariance, in px^2.
+    /// The number that is added to both diagonal elements of the screen-space covariance, in px^2.
     pub low_pass_variance: f32,
     /// The least alpha that contributes.
     pub alpha_floor: f32,
     /// The greatest alpha.
     pub alpha_ceiling: f32,
-    /// A pixel is finished before its transmittance would fall below this.
+    /// The least transmittance of a pixel. A pixel is finished before its transmittance would fall below it.
     pub transmittance_floor: f32,
-    /// How far pixels may be from all that.
+    /// The errors that are permitted.
     pub approximation: GaussianApproximation,
-    /// The samples that may be covered.
+    /// The mask of samples that may be covered.
     pub sample_mask: u32,
-    /// Depth and stencil. Gaussians face the front.
+    /// The depth and stencil state. Gaussians are front-facing.
     pub depth_stencil: DepthStencil,
-    /// The logic operation, if enabled; it then replaces blending.
+    /// The logic operation, if enabled. It then replaces blending.
     pub logic_op: Option<LogicOp>,
-    /// Blending and write masks, one per colour attachment. Only the first attachment is written.
+    /// The blending and write masks, one per colour attachment. Only the first attachment is written.
     pub blend: Vec<BlendState>,
     /// The constants of the constant blend factors.
     pub blend_constants: [f32; 4],
 }
 
 impl Default for GaussianState {
-    /// The defaults of 3DGS, degree 0; nothing is tested, and the fragment replaces what the attachment holds.
+    /// The defaults of 3DGS, with harmonics of degree 0. Nothing is tested, and the fragment replaces the attachment's
+    /// colour.
     fn default() -> Self {
         Self {
             sh_degree: 0,

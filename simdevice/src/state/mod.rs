@@ -1,4 +1,4 @@
-//! The state of draws, which their pipelines and commands fix.
+//! The state of draws, which pipelines and commands set.
 
 pub mod gaussian;
 
@@ -19,7 +19,7 @@ pub struct Rect {
 }
 
 impl Rect {
-    /// The pixels that lie in both, as an empty rectangle where there are none.
+    /// The pixels that are in both rectangles. The result is empty if there are none.
     pub fn intersect(self, other: Self) -> Self {
         let right = |r: &Self| i64::from(r.x) + i64::from(r.width);
         let bottom = |r: &Self| i64::from(r.y) + i64::from(r.height);
@@ -33,18 +33,18 @@ impl Rect {
         }
     }
 
-    /// Whether it holds no pixel.
+    /// True if it contains no pixel.
     pub fn is_empty(self) -> bool {
         self.width == 0 || self.height == 0
     }
 }
 
-/// How the samples of a texel become one.
+/// The function that turns the samples of a texel into one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ResolveMode {
-    /// The first sample. What integer and stencil attachments, which have no mean, are commonly resolved by.
+    /// The first sample. It is common for integer and stencil attachments, which have no mean.
     SampleZero,
-    /// The mean of all samples, of what they mean rather than of their codes: sRGB is decoded first.
+    /// The mean of the values of all samples. sRGB samples are decoded before, and their mean is encoded.
     Average,
     /// The least sample, component by component.
     Min,
@@ -63,9 +63,9 @@ pub struct Viewport {
     pub width: f32,
     /// The height.
     pub height: f32,
-    /// The depth that 0 maps to.
+    /// The depth that 0 is mapped to.
     pub min_depth: f32,
-    /// The depth that 1 maps to.
+    /// The depth that 1 is mapped to.
     pub max_depth: f32,
 }
 
@@ -105,7 +105,7 @@ pub enum BlendOp {
     Max,
 }
 
-/// One half (colour or alpha) of the blend equation: `op(source * s, destination * d)`.
+/// One half (colour or alpha) of the blend equation: `op(source * s, destination * d)` with the factors `s` and `d`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct BlendEquation {
     /// The source's factor.
@@ -125,7 +125,7 @@ pub struct BlendState {
     pub write_mask: u8,
 }
 
-/// How vertices make primitives.
+/// The assembly of vertices to primitives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[allow(missing_docs, reason = "the names are Vulkan's")]
 pub enum Topology {
@@ -141,7 +141,7 @@ pub enum Topology {
     TriangleStripWithAdjacency,
 }
 
-/// What of a polygon is drawn.
+/// The part of a polygon that is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[allow(missing_docs, reason = "the names are Vulkan's")]
 pub enum PolygonMode {
@@ -150,7 +150,7 @@ pub enum PolygonMode {
     Point,
 }
 
-/// A comparison of a reference with what memory holds: `reference op stored`.
+/// A comparison of a reference with the stored value: `reference op stored`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[allow(missing_docs, reason = "the names are Vulkan's")]
 pub enum CompareOp {
@@ -165,7 +165,7 @@ pub enum CompareOp {
 }
 
 impl CompareOp {
-    /// Tells whether it holds. A comparison with NaN is false, but for [`CompareOp::NotEqual`] and
+    /// True if the comparison holds. A comparison with NaN is false, except for [`CompareOp::NotEqual`] and
     /// [`CompareOp::Always`].
     #[inline(always)]
     pub fn holds<T: PartialOrd>(self, reference: T, stored: T) -> bool {
@@ -182,7 +182,7 @@ impl CompareOp {
     }
 }
 
-/// What becomes of a stencil value.
+/// The change of a stencil value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[allow(missing_docs, reason = "the names are Vulkan's")]
 pub enum StencilOp {
@@ -199,50 +199,50 @@ pub enum StencilOp {
 /// The stencil test of one face.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct StencilFace {
-    /// When the stencil test fails.
+    /// The operation if the stencil test fails.
     pub fail: StencilOp,
-    /// When both tests pass.
+    /// The operation if the stencil and depth tests pass.
     pub pass: StencilOp,
-    /// When only the depth test fails.
+    /// The operation if only the depth test fails.
     pub depth_fail: StencilOp,
-    /// `reference & compare_mask op stored & compare_mask`.
+    /// The comparison: `reference & compare_mask op stored & compare_mask`.
     pub compare: CompareOp,
-    /// The bits compared.
+    /// The bits that are compared.
     pub compare_mask: u8,
-    /// The bits written.
+    /// The bits that are written.
     pub write_mask: u8,
-    /// The reference.
+    /// The reference value.
     pub reference: u8,
 }
 
 /// Depth and stencil state. By default nothing is tested.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DepthStencil {
-    /// The depth test; `None` passes always and writes nothing.
+    /// The depth test. Without one, every fragment passes and no depth is written.
     pub depth: Option<DepthTest>,
-    /// The depth bounds that the stored depth must lie in.
+    /// The least and the greatest stored depth at which a fragment passes.
     pub bounds: Option<(f32, f32)>,
-    /// The stencil test of front and back faces.
+    /// The stencil tests of front and back faces.
     pub stencil: Option<[StencilFace; 2]>,
 }
 
 /// The depth test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct DepthTest {
-    /// `fragment op stored`.
+    /// The comparison: `fragment op stored`.
     pub compare: CompareOp,
-    /// Whether depth is written where it passes.
+    /// True if the depth of a fragment that passes is written.
     pub write: bool,
 }
 
 /// Depth bias.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DepthBias {
-    /// In units of the depth format's resolution.
+    /// The constant bias, in units of the depth format's resolution.
     pub constant: f32,
-    /// The greatest bias if positive, the least if negative; none if 0.
+    /// The greatest bias if positive, the least bias if negative; no limit if 0.
     pub clamp: f32,
-    /// Times the polygon's greatest slope.
+    /// The factor of the polygon's greatest depth slope.
     pub slope: f32,
 }
 
@@ -268,60 +268,61 @@ pub enum LogicOp {
     Set,
 }
 
-/// The fixed-function state of a draw, static and dynamic alike.
+/// The fixed-function state of a draw, both static and dynamic.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DrawState {
-    /// How vertices make primitives.
+    /// The assembly of vertices to primitives.
     pub topology: Topology,
-    /// Whether the greatest index restarts the primitive.
+    /// True if the greatest index restarts the primitive.
     pub primitive_restart: bool,
     /// The viewports.
     pub viewports: Vec<Viewport>,
-    /// The scissors, one for each viewport.
+    /// The scissor rectangles, one for each viewport.
     pub scissors: Vec<Rect>,
-    /// Depth is clamped to the viewport's range, and primitives are not clipped at the near and far planes.
+    /// True if depth is clamped to the viewport's range, and primitives are not clipped at the near and far planes.
     pub depth_clamp: bool,
-    /// Whether primitives are clipped at the near and far planes, if that doesn't follow from `depth_clamp`.
+    /// True if primitives are clipped at the near and far planes. `None` follows from `depth_clamp`.
     pub depth_clip: Option<bool>,
-    /// Nothing is rasterized.
+    /// True if nothing is rasterized.
     pub rasterizer_discard: bool,
-    /// What of polygons is drawn.
+    /// The part of polygons that is drawn.
     pub polygon_mode: PolygonMode,
-    /// Whether front faces are culled.
+    /// True if front faces are culled.
     pub cull_front: bool,
-    /// Whether back faces are culled.
+    /// True if back faces are culled.
     pub cull_back: bool,
-    /// Whether front faces are clockwise in the framebuffer (y down); else they are counter-clockwise.
+    /// True if front faces are clockwise in the framebuffer, whose y points down; else they are counter-clockwise.
     pub front_clockwise: bool,
-    /// Depth bias, if enabled.
+    /// The depth bias, if enabled.
     pub depth_bias: Option<DepthBias>,
     /// The width of lines in pixels.
     pub line_width: f32,
-    /// Whether the provoking vertex is the last, not the first.
+    /// True if the provoking vertex is the last; else it is the first.
     pub provoking_last: bool,
-    /// Samples per pixel of the pass: 1 or 4.
+    /// The samples per pixel of the pass: 1 or 4.
     pub samples: u32,
-    /// The samples that may be covered.
+    /// The mask of samples that may be covered.
     pub sample_mask: u32,
-    /// Whether every sample is shaded for itself.
+    /// True if the fragment program runs once for each sample.
     pub sample_shading: bool,
-    /// Alpha makes coverage.
+    /// True if the alpha of a fragment determines its coverage.
     pub alpha_to_coverage: bool,
-    /// Alpha becomes 1 after that.
+    /// True if alpha is replaced by 1 after coverage was determined.
     pub alpha_to_one: bool,
-    /// Depth and stencil.
+    /// The depth and stencil state.
     pub depth_stencil: DepthStencil,
-    /// The logic operation, if enabled; it then replaces blending.
+    /// The logic operation, if enabled. It then replaces blending.
     pub logic_op: Option<LogicOp>,
-    /// Blending and write masks, one per colour attachment.
+    /// The blending and write masks, one per colour attachment.
     pub blend: Vec<BlendState>,
     /// The constants of the constant blend factors.
     pub blend_constants: [f32; 4],
 }
 
 impl DrawState {
-    /// Filled primitives over a framebuffer of that many pixels, one sample each: nothing is culled, tested, biased or
-    /// blended, and front faces are clockwise. Attachments have no state yet.
+    /// Filled primitives over a framebuffer of that many pixels with one sample each. Nothing is culled, tested, biased
+    /// or blended, and front faces are clockwise. `blend` is empty, so that the caller must add a state for each
+    /// attachment.
     pub fn new(topology: Topology, [width, height]: [u32; 2]) -> Self {
         Self {
             topology,
@@ -368,7 +369,7 @@ impl DrawState {
 }
 
 impl Display for Rect {
-    /// `widthxheight+x+y`.
+    /// Writes `widthxheight+x+y`.
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let Self {
             x,

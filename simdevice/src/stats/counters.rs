@@ -1,13 +1,13 @@
-//! Counters of the work that the device does. They accumulate over a command processor's life; a query reads
-//! the difference between its end and its beginning.
+//! Counters of the device's work. They are summed from a command processor's creation on. A query reads the difference
+//! between the values at its end and at its beginning.
 
 use isa::machine::Work;
 use isa::op::Kind;
 
-/// What a counter counts.
+/// The unit of a counter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unit {
-    /// Things.
+    /// A number of things.
     Count,
     /// Host nanoseconds.
     Nanoseconds,
@@ -19,20 +19,20 @@ pub enum Unit {
     Bytes,
     /// Nanojoules that the simulated hardware spends.
     Nanojoules,
-    /// Hundredths.
+    /// Hundredths of a whole.
     Percent,
 }
 
-/// How a counter is presented to people.
+/// The description of a counter for people.
 #[derive(Clone, Copy, Debug)]
 pub struct CounterInfo {
     /// A stable name, such as "gaussians drawn".
     pub name: &'static str,
-    /// The group it belongs to.
+    /// The group of the counter.
     pub category: &'static str,
-    /// One sentence.
+    /// A sentence that describes the counter.
     pub description: &'static str,
-    /// What it counts.
+    /// The counter's unit.
     pub unit: Unit,
 }
 
@@ -48,7 +48,7 @@ macro_rules! counters {
             /// Every counter, in order.
             pub const ALL: &[Self] = &[$(Self::$variant,)*];
 
-            /// How it is presented to people.
+            /// The counter's description for people.
             pub fn info(self) -> CounterInfo {
                 match self {
                     $(Self::$variant => CounterInfo {
@@ -152,13 +152,13 @@ counters! {
 }
 
 impl Counter {
-    /// Whether a model of the hardware must run for it.
+    /// True if the counter needs a model of the hardware to run.
     pub fn is_simulated(self) -> bool {
         self as usize >= Self::SimulatedTime as usize
     }
 }
 
-/// The counter of a kind of instruction.
+/// The counter of instructions of one kind.
 fn of_kind(kind: Kind) -> Counter {
     match kind {
         Kind::Float => Counter::ShaderFloat,
@@ -189,18 +189,18 @@ impl Default for Counters {
 }
 
 impl Counters {
-    /// The counter's value.
+    /// The value of a counter.
     pub fn get(&self, counter: Counter) -> u64 {
         self.values[counter as usize]
     }
 
-    /// Adds to the counter.
+    /// Adds `amount` to a counter.
     pub fn add(&mut self, counter: Counter, amount: u64) {
         let value = &mut self.values[counter as usize];
         *value = value.wrapping_add(amount);
     }
 
-    /// Sets what follows from other counters.
+    /// Computes the counters that follow from other counters.
     pub(crate) fn derive(&mut self) {
         let busy = self.get(Counter::SimulatedBusy);
         let stalls = [
@@ -215,7 +215,7 @@ impl Counters {
         self.values[Counter::SimulatedOccupancy as usize] = percent;
     }
 
-    /// Adds what shader cores did.
+    /// Adds the work of shader cores.
     pub fn add_work(&mut self, work: &Work) {
         for kind in Kind::ALL {
             self.add(of_kind(kind), work.instructions[kind as usize]);
@@ -234,7 +234,7 @@ impl Counters {
         }
     }
 
-    /// What was added since `earlier`.
+    /// The differences of all counters to `earlier`.
     pub fn since(&self, earlier: &Self) -> Self {
         let mut values = self.values;
         for (value, earlier) in values.iter_mut().zip(earlier.values) {

@@ -1,4 +1,4 @@
-//! Statistics: counters, queries of them, the optimizations that can be switched off, and the recorder of work.
+//! Statistics: counters, queries of counters, optimizations that can be switched off, and the recorder of work.
 
 pub mod counters;
 pub mod optimizations;

@@ -1,12 +1,12 @@
-//! Optimizations: work that the device leaves out because it changes no pixel. Each has a name, a counter of what it saved and a
-//! switch, so that tests prove that the image is the same without it.
+//! Optimizations: work that the device omits because it changes no pixel. Each has a name, a counter of the omitted
+//! work and a switch. Tests compare images with and without it.
 
 use crate::stats::counters::Counter;
 use std::str::FromStr;
 
 macro_rules! optimizations {
     ($($variant:ident: $name:literal, $counter:ident, $description:literal;)*) => {
-        /// A kind of work that may be left out.
+        /// A kind of work that may be omitted.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         pub enum Optimization {
             $(#[doc = $description] $variant,)*
@@ -16,14 +16,14 @@ macro_rules! optimizations {
             /// Every optimization.
             pub const ALL: &[Self] = &[$(Self::$variant,)*];
 
-            /// The name that switches know it by.
+            /// The name by which switches select it.
             pub fn name(self) -> &'static str {
                 match self {
                     $(Self::$variant => $name,)*
                 }
             }
 
-            /// What counts that which it saved; zero while it is off.
+            /// The counter of the omitted work. It stays zero while the optimization is off.
             pub fn counter(self) -> Counter {
                 match self {
                     $(Self::$variant => Counter::$counter,)*
@@ -54,7 +54,7 @@ optimizations! {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Optimizations(u32);
 
-/// A name is none of an optimization's.
+/// A name that is not the name of an optimization.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "{name:?} is neither all nor none nor an optimization, which are {}",
@@ -79,18 +79,18 @@ impl Optimizations {
     /// No optimization.
     pub const NONE: Self = Self(0);
 
-    /// Whether `optimization` is used.
+    /// True if `optimization` is used.
     #[inline(always)]
     pub fn has(self, optimization: Optimization) -> bool {
         self.0 >> optimization as u32 & 1 == 1
     }
 
-    /// These and `optimization`.
+    /// These optimizations and `optimization`.
     pub fn with(self, optimization: Optimization) -> Self {
         Self(self.0 | 1 << optimization as u32)
     }
 
-    /// These but `optimization`.
+    /// These optimizations without `optimization`.
     pub fn without(self, optimization: Optimization) -> Self {
         Self(self.0 & !(1 << optimization as u32))
     }
@@ -105,7 +105,8 @@ impl Default for Optimizations {
 impl FromStr for Optimizations {
     type Err = UnknownOptimization;
 
-    /// `all`, `none`, or names of optimizations, separated by commas; or `all` without some, each after a minus: `all,-blocks`.
+    /// Reads `all`, `none`, or names of optimizations, separated by commas. `all` may be followed by names with a
+    /// minus, which are left out: `all,-blocks`.
     fn from_str(text: &str) -> Result<Self, UnknownOptimization> {
         let known = |name: &str| {
             let optimization = Optimization::ALL

@@ -5,16 +5,16 @@ use devmem::host;
 use std::sync::{Condvar, LazyLock, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-/// The host's monotonic time in nanoseconds since the process first asked for it; what timestamps hold.
+/// The host's monotonic time since the first call in this process, in nanoseconds. Timestamps hold it.
 pub fn host_time() -> u64 {
     static START: LazyLock<Instant> = LazyLock::new(Instant::now);
     START.elapsed().as_nanos() as u64
 }
 
-/// What the queries of a pool measure.
+/// The quantity that the queries of a pool measure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum QueryKind {
-    /// The device's counters, those that a model of the hardware must run for apart.
+    /// The device's counters, except those that need a model of the hardware.
     Performance,
     /// All of the device's counters.
     Simulated,
@@ -25,18 +25,18 @@ pub enum QueryKind {
 /// The result of a query.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum QueryResult {
-    /// The counters' differences between end and beginning.
+    /// The differences of the counters between the end and the beginning.
     Performance(Box<Counters>),
-    /// Nanoseconds.
+    /// A time in nanoseconds.
     Timestamp(u64),
 }
 
-/// A query's life.
+/// The state of a query.
 #[derive(Clone, Debug, Default)]
 enum Slot {
     #[default]
     Unavailable,
-    /// Begun, with the counters at that moment.
+    /// Begun, with the counters at its beginning.
     Active(Box<Counters>),
     Available(QueryResult),
 }
@@ -50,7 +50,7 @@ pub struct QueryPool {
 }
 
 impl QueryPool {
-    /// A pool of `count` unavailable queries.
+    /// Makes a pool of `count` unavailable queries.
     pub fn new(kind: QueryKind, count: u32) -> Self {
         Self {
             kind,
@@ -59,18 +59,18 @@ impl QueryPool {
         }
     }
 
-    /// What its queries measure.
+    /// The quantity that its queries measure.
     pub fn kind(&self) -> QueryKind {
         self.kind
     }
 
-    /// How many queries it has.
+    /// The number of queries.
     pub fn count(&self) -> u32 {
         self.lock().len() as u32
     }
 
     fn lock(&self) -> MutexGuard<'_, Vec<Slot>> {
-        // A slot is replaced whole, so that a panic elsewhere leaves nothing half-written.
+        // A slot is replaced as a whole, so that a panic while the lock is held leaves no slot half-written.
         self.slots.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -98,7 +98,7 @@ impl QueryPool {
         self.set(index, Slot::Active(Box::new(now.clone())));
     }
 
-    /// Ends a query that was begun.
+    /// Ends a query that was begun. Does nothing for a query that was not.
     pub(crate) fn end(&self, index: u32, now: &Counters) {
         let begun = match self.lock().get(index as usize) {
             Some(Slot::Active(begun)) => begun.clone(),
@@ -117,7 +117,7 @@ impl QueryPool {
         self.set(index, Slot::Available(QueryResult::Timestamp(nanoseconds)));
     }
 
-    /// The result of a query, or `None` while it is unavailable or out of range.
+    /// The result of a query; `None` while it is unavailable or if `index` is out of range.
     pub fn result(&self, index: u32) -> Option<QueryResult> {
         match self.lock().get(index as usize)? {
             Slot::Available(result) => Some(result.clone()),

@@ -1,6 +1,6 @@
-//! The trace of work, for those who ask for it: what every draw did before tiles and in every tile, and what dispatches
-//! did. Off unless a [`Recorder`] is in the device's configuration or a query listens; it reads what the device has
-//! computed and counted, and changes no bit of it.
+//! The recorder of work: the work of every draw before tiles and in every tile, and the work of dispatches. It is off
+//! unless a [`Recorder`] is in the device's configuration, timestamps are simulated or a query listens. It only reads
+//! data that the device has computed and counted, so that it changes no image.
 
 use crate::state::Rect;
 use crate::stats::counters::{Counter, Counters};
@@ -13,30 +13,31 @@ pub use timing::work::{
     DrawWork, FrameWork, Mode, Run, ShaderWork, TRACE_VERSION, TileWork, Trace,
 };
 
-/// Render passes that are kept; older ones make room for newer ones.
+/// The number of render passes that are kept. A new pass then replaces the oldest.
 const MAX_FRAMES: usize = 64;
 
-/// Who takes the trace in the end.
+/// The function that receives the whole trace at the end.
 type Sink = Box<dyn FnOnce(Trace) + Send>;
 
-/// Gathers the work of a device's render passes, and hands it over when the device and all its draws are gone.
+/// Records the work of a device's render passes. It gives the trace to its sink when the device and all its draws are
+/// gone.
 #[derive(Default)]
 pub struct Recorder {
     frames: Mutex<Frames>,
     sink: Mutex<Option<Sink>>,
-    /// Queries that want to know.
+    /// The number of queries that listen.
     listeners: AtomicU32,
 }
 
-/// Whose work it is: each command processor of a device has a number of its own.
+/// The number of a command processor, which tells its work from that of the device's other command processors.
 pub(crate) type Owner = u64;
 
 #[derive(Default)]
 struct Frames {
     kept: VecDeque<Frame>,
-    /// Frames that were begun so far.
+    /// The number of frames that were begun so far.
     begun: u64,
-    /// Dispatches of each owner since its last pass began.
+    /// The dispatches of each owner since its last pass began.
     dispatched: BTreeMap<Owner, Dispatched>,
 }
 
@@ -49,7 +50,7 @@ struct Dispatched {
 #[derive(Default)]
 struct Frame {
     owner: Owner,
-    /// How many were begun before it.
+    /// The number of frames that were begun before it.
     number: u64,
     size: [u32; 2],
     before: Dispatched,
@@ -68,8 +69,8 @@ impl Frame {
     }
 }
 
-/// A draw's work, as far as it has been done, and what fragment programs counted after rasterizing Gaussians: in whole
-/// numbers, so that it does not matter which tile was first.
+/// The work of a draw so far, and the counters of fragment programs that ran after Gaussians were rasterized. All are
+/// sums of whole numbers, so that the order of the tiles does not change them.
 #[derive(Debug, Default)]
 pub struct DrawRecord(Mutex<DrawWork>, Mutex<Counters>);
 
@@ -80,7 +81,7 @@ impl fmt::Debug for Recorder {
 }
 
 impl Recorder {
-    /// A recorder that gives the whole trace to `sink` when it is dropped.
+    /// Makes a recorder that gives the whole trace to `sink` when it is dropped.
     pub fn new(sink: impl FnOnce(Trace) + Send + 'static) -> Self {
         Self {
             frames: Mutex::default(),
@@ -89,7 +90,7 @@ impl Recorder {
         }
     }
 
-    /// What was done so far. Passes that drew nothing are left out.
+    /// The work so far. Passes that drew nothing are omitted.
     pub fn trace(&self) -> Trace {
         let frames = self.lock();
         let last = frames.dispatched.values().map(|&before| Frame {
@@ -103,8 +104,8 @@ impl Recorder {
         }
     }
 
-    /// What an owner did in frames from number `from` on, as far as they are kept; `from` becomes the next frame's
-    /// number. Dispatches since its last pass are a frame of their own from now on.
+    /// The work of an owner in frames from number `from` on, as far as they are kept. `from` becomes the number of the
+    /// next frame. Dispatches since the owner's last pass become a frame of their own.
     pub(crate) fn work_since(&self, owner: Owner, from: &mut u64) -> Vec<FrameWork> {
         let mut frames = self.lock();
         if frames.dispatched.contains_key(&owner) {
@@ -121,22 +122,22 @@ impl Recorder {
         self.frames.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Whether a query wants to know what is done.
+    /// True if a query listens.
     pub(crate) fn has_listeners(&self) -> bool {
         self.listeners.load(Relaxed) > 0
     }
 
-    /// Begins to listen.
+    /// Adds a listener: work is recorded from now on.
     pub(crate) fn listen(&self) {
         self.listeners.fetch_add(1, Relaxed);
     }
 
-    /// Ends what [`Recorder::listen`] began.
+    /// Removes a listener that [`Recorder::listen`] added.
     pub(crate) fn stop_listening(&self) {
         self.listeners.fetch_sub(1, Relaxed);
     }
 
-    /// Forgets all that an owner did.
+    /// Forgets all work of an owner.
     pub(crate) fn clear(&self, owner: Owner) {
         let mut frames = self.lock();
         frames.kept.retain(|frame| frame.owner != owner);
@@ -157,7 +158,7 @@ impl Recorder {
         }
     }
 
-    /// Adds a dispatch, of which `counters` tell.
+    /// Adds a dispatch, whose work is in `counters`.
     pub(crate) fn add_dispatch(&self, owner: Owner, counters: &Counters) {
         let mut frames = self.lock();
         let dispatched = frames.dispatched.entry(owner).or_default();
@@ -183,9 +184,10 @@ impl Frames {
     }
 }
 
-/// What shader cores did, in operations of single lanes. Instructions are counted by kind and lanes are not, so that
-/// all kinds are taken to have had as many active lanes; operations for all lanes of a batch at once count once. Every
-/// load, store and image access is taken to move 32 bits that no cache holds.
+/// The work of shader cores, in operations of single lanes. Counters tell instructions of each kind, but active lanes
+/// only in total, so that all kinds are assumed to have the same mean number of active lanes. An operation for all
+/// lanes of a batch at once counts once. Every load, store and image access is assumed to move 32 bits that no cache
+/// holds.
 pub(crate) fn shader_work(counters: &Counters) -> ShaderWork {
     let count = |wanted: &[Counter]| -> u64 { wanted.iter().map(|&c| counters.get(c)).sum() };
     let instructions = count(&[
@@ -224,10 +226,10 @@ pub(crate) fn shader_work(counters: &Counters) -> ShaderWork {
     }
 }
 
-/// Tiles of each of [`TILE_SIDES`] that the box from `low` to `high` touches, in pixels of `bounds`, which is not left of
-/// or above the framebuffer's corner.
+/// The number of tiles, for each of [`TILE_SIDES`], that the box from `low` to `high` touches within `bounds`, in
+/// pixels. The corner of `bounds` must not be negative.
 pub(crate) fn sized_tiles(low: [f64; 2], high: [f64; 2], bounds: Rect) -> [u64; TILE_SIDES.len()] {
-    // In whole pixels: a rounding of floats for every size would cost more than all the rest.
+    // Whole pixels are used, because rounding floats for every size is slow.
     let pixels = |axis: usize| {
         let (start, length) = match axis {
             0 => (bounds.x, bounds.width),
@@ -263,28 +265,28 @@ impl Drop for Recorder {
 }
 
 impl DrawRecord {
-    /// A draw of which so much is known.
+    /// Makes a record of a draw whose work before tiles is known.
     pub(crate) fn new(work: DrawWork) -> Arc<Self> {
         Arc::new(Self(Mutex::new(work), Mutex::default()))
     }
 
-    /// Changes what is known of the work.
+    /// Changes the recorded work.
     pub(crate) fn update(&self, change: impl FnOnce(&mut DrawWork)) {
         change(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner));
     }
 
-    /// Adds a tile.
+    /// Adds the work of a tile.
     pub(crate) fn add(&self, tile: TileWork) {
         self.update(|work| work.tiles.push(tile));
     }
 
-    /// Adds what fragment programs did in a tile; `counters` are those of it alone.
+    /// Adds the work of fragment programs in a tile; `counters` are those of the tile alone.
     pub(crate) fn add_shading(&self, counters: &Counters) {
         let mut shading = self.1.lock().unwrap_or_else(PoisonError::into_inner);
         shading.add_all(counters);
     }
 
-    /// The draw with its tiles row by row, whichever worker was first.
+    /// The draw's work, with its tiles in order of rows, then columns.
     fn finished(&self) -> DrawWork {
         let mut work = self
             .0
@@ -299,7 +301,7 @@ impl DrawRecord {
     }
 }
 
-/// Adds a run to a tile's, or lengthens the last one if nothing finished in between.
+/// Appends a run to a tile's runs, or adds it to the last run if no row or block finished in between.
 pub(crate) fn push_run(runs: &mut Vec<Run>, run: Run) {
     match runs.last_mut() {
         Some(last) if (last.rows, last.blocks) == (run.rows, run.blocks) => {

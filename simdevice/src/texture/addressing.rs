@@ -1,8 +1,8 @@
-//! Coordinates along one axis: from what a program gives to texel indices, lane by lane or, with the same bits, 16 lanes at
-//! once.
+//! Addressing along one axis: converts a program's coordinates to texel indices, lane by lane or 16 lanes at once, with
+//! the same bits.
 //!
 //! Vulkan 1.3, "Wrapping Operation" and "(u,v,w,a) to (i,j,k,l,n) Transformation". Periodic coordinates are reduced to
-//! one period before they are scaled to texels, which is exact and keeps large ones as precise as they can be.
+//! one period before they are scaled to texels. That is exact, and large coordinates lose no further precision.
 
 use super::sampler::{AddressMode, Filter};
 use super::texels::Floats;
@@ -10,26 +10,26 @@ use fearless_simd::{Simd, f32x16, i32x16, mask32x16, prelude::*, u32x16};
 use isa::ir::VECTOR_LANES;
 use isa::resources::LaneWords;
 
-/// Floats from here on are integers: coordinates are whole periods.
+/// The magnitude from which on floats are integers, so that coordinates are whole periods.
 const WHOLE: f32 = 8_388_608.0;
 
-/// Texel coordinates are clamped to this magnitude. Beyond any image, and an offset added to it is still exact.
+/// The magnitude to which texel coordinates are clamped. It is beyond any image, and adding an offset to it is exact.
 const FAR: f32 = 4_194_304.0;
 
-/// Texel offsets are clamped to this magnitude.
+/// The magnitude to which texel offsets are clamped.
 const MAX_OFFSET: i32 = 1 << 16;
 
-/// The texels that a coordinate means along one axis.
+/// The texels of a coordinate along one axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Taps {
-    /// Indices; None outside the image. Nearest filtering uses the first only.
+    /// The indices of both texels; `None` outside the image. Nearest filtering uses only the first.
     pub index: [Option<u32>; 2],
-    /// Weight of the second.
+    /// The weight of the second texel.
     pub weight: f32,
 }
 
 impl Taps {
-    /// The only texel of an axis that the image doesn't have.
+    /// The taps of an axis that the image does not have.
     pub const FLAT: Self = Self {
         index: [Some(0); 2],
         weight: 0.0,
@@ -51,7 +51,7 @@ impl Taps {
     }
 }
 
-/// The coordinate in texels, within [`FAR`]; NaN counts as 0.
+/// The coordinate in texels, clamped to [`FAR`] or, for periodic modes, reduced to one period. NaN counts as 0.
 pub(super) fn texel_coordinate(mode: AddressMode, s: f32, normalized: bool, size: u32) -> f32 {
     let s = if s.is_nan() { 0.0 } else { s };
     let size = size as f32;
@@ -69,7 +69,7 @@ pub(super) fn texel_coordinate(mode: AddressMode, s: f32, normalized: bool, size
     }
 }
 
-/// The first texel that a filter takes, before wrapping, and the weight of the next.
+/// The first texel of a filter, before wrapping, and the weight of the next texel.
 pub(super) fn first_texel(filter: Filter, u: f32) -> (i32, f32) {
     match filter {
         Filter::Nearest => (u.floor() as i32, 0.0),
@@ -81,7 +81,7 @@ pub(super) fn first_texel(filter: Filter, u: f32) -> (i32, f32) {
     }
 }
 
-/// An index within the image; None is the border.
+/// The wrapped index; `None` for the border.
 pub(super) fn wrap(mode: AddressMode, i: i32, size: u32) -> Option<u32> {
     let size = i64::from(size);
     let i = i64::from(i);
@@ -99,7 +99,7 @@ pub(super) fn wrap(mode: AddressMode, i: i32, size: u32) -> Option<u32> {
     (0..size).contains(&wrapped).then_some(wrapped as u32)
 }
 
-/// The array layer of a coordinate: to nearest, ties to even, clamped. NaN counts as 0.
+/// The array layer of a coordinate: rounded to nearest, ties to even, and clamped. NaN counts as 0.
 #[inline(always)]
 pub(super) fn layer(coordinate: f32, layers: u32) -> u32 {
     (coordinate.round_ties_even() as u32).min(layers.saturating_sub(1))
@@ -108,18 +108,18 @@ pub(super) fn layer(coordinate: f32, layers: u32) -> u32 {
 /// The texels of 16 coordinates along one axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Axis {
-    /// Indices within the image. Nearest filtering uses the first only.
+    /// The indices, clamped to the image. Nearest filtering uses only the first.
     pub index: [LaneWords; 2],
-    /// Lanes whose texel isn't the border.
+    /// The lanes whose texel is not the border, for each of both texels.
     pub inside: [u16; 2],
-    /// Weight of the second.
+    /// The weight of the second texel.
     pub weight: Floats,
-    /// Whether any lane's texel is the border.
+    /// True if the texel of any lane is the border.
     pub has_outside: bool,
 }
 
 impl Axis {
-    /// An axis that the image doesn't have.
+    /// The axis of coordinates that the image does not have.
     pub const FLAT: Self = Self {
         index: [[0; VECTOR_LANES]; 2],
         inside: [u16::MAX; 2],
@@ -128,7 +128,7 @@ impl Axis {
     };
 }
 
-/// The texels of `coordinate`, whose bits these are, along an axis of `size` texels. Compiled on its own.
+/// The texels along an axis of `size` texels, given the bits of `coordinate`. The kernel is compiled on its own.
 #[inline(always)]
 pub(super) fn axis<S: Simd>(
     simd: S,
@@ -188,16 +188,16 @@ fn vector_axis<S: Simd>(
     }
 }
 
-/// The texels of 16 coordinates along one axis for linear filters, in vectors: without borders or offsets.
+/// The texels of 16 coordinates along one axis for linear filters, as vectors, without borders or offsets.
 #[derive(Clone, Copy)]
 pub(super) struct VectorTaps<S: Simd> {
     pub first: u32x16<S>,
     pub second: u32x16<S>,
-    /// Weight of the second.
+    /// The weight of the second texel.
     pub weight: f32x16<S>,
 }
 
-/// As [`axis`], for normalized coordinates and a linear filter.
+/// The results of [`axis`], for normalized coordinates and a linear filter.
 #[inline(always)]
 pub(super) fn taps<S: Simd>(
     simd: S,
@@ -214,7 +214,7 @@ pub(super) fn taps<S: Simd>(
     }
 }
 
-/// As [`texel_coordinate`].
+/// The results of [`texel_coordinate`] for 16 lanes.
 #[inline(always)]
 fn texel_coordinates<S: Simd>(
     simd: S,
@@ -240,7 +240,7 @@ fn texel_coordinates<S: Simd>(
     }
 }
 
-/// As [`wrap`]; the border's indices are clamped.
+/// The results of [`wrap`] for 16 lanes. Indices of the border are clamped.
 #[inline(always)]
 fn wrap_lanes<S: Simd>(
     simd: S,
@@ -263,7 +263,7 @@ fn wrap_lanes<S: Simd>(
     i32x16::truncate_from(wrapped.max(zero).min(size - 1.0)).bitcast()
 }
 
-/// An index reduced to 0.. of a period; if it isn't `far`, it is known to be within a period of that.
+/// The index reduced to `0..period`. Unless `far`, it must be at most a period outside of that range.
 #[inline(always)]
 fn reduce_lanes<S: Simd>(simd: S, i: f32x16<S>, period: f32x16<S>, far: bool) -> f32x16<S> {
     let zero = f32x16::splat(simd, 0.0);
@@ -276,14 +276,14 @@ fn reduce_lanes<S: Simd>(simd: S, i: f32x16<S>, period: f32x16<S>, far: bool) ->
     i - i.simd_ge(period).select(period, zero)
 }
 
-/// The lanes whose index an image of `size` texels has.
+/// The lanes whose index is in an image of `size` texels.
 #[inline(always)]
 fn lanes_within<S: Simd>(simd: S, i: f32x16<S>, size: f32x16<S>) -> u16 {
     let inside: mask32x16<S> = i.simd_ge(f32x16::splat(simd, 0.0)) & i.simd_lt(size);
     inside.to_bitmask() as u16
 }
 
-/// The greatest integers that aren't greater; of numbers within 2^30.
+/// The greatest integers that are not greater, for numbers within 2^30.
 #[inline(always)]
 fn floor_lanes<S: Simd>(simd: S, x: f32x16<S>) -> f32x16<S> {
     let truncated = f32x16::float_from(i32x16::truncate_from(x));
@@ -291,7 +291,7 @@ fn floor_lanes<S: Simd>(simd: S, x: f32x16<S>) -> f32x16<S> {
     truncated - truncated.simd_gt(x).select(one, zero)
 }
 
-/// `x` within a magnitude.
+/// The lanes of `x`, clamped to a magnitude.
 #[inline(always)]
 fn clamp_lanes<S: Simd>(x: f32x16<S>, magnitude: f32) -> f32x16<S> {
     x.max(-magnitude).min(magnitude)

@@ -1,8 +1,8 @@
-//! Anisotropic filtering: a pixel's footprint that is longer than wide is sampled several times along its length, each
-//! time at the level of detail of its width.
+//! Anisotropic filtering: samples a pixel's elongated footprint several times along its length, each time at the level
+//! of detail of its width.
 //!
-//! Vulkan 1.3, "Texel Anisotropic Filtering". Images of two dimensions are filtered so; of all others the isotropic sample
-//! is taken, which minifies along the longer axis.
+//! Vulkan 1.3, "Texel Anisotropic Filtering". Only two-dimensional images are filtered this way. Others use an
+//! isotropic sample, whose level of detail follows from the longer axis.
 
 use super::lod;
 use super::sampler::Sampler;
@@ -12,15 +12,16 @@ use isa::resources::{LaneWords, LodRequest, SampleRequest};
 
 /// The footprints of 16 lanes.
 struct Footprints {
-    /// The samples along each.
+    /// The number of samples along each footprint.
     counts: [u32; VECTOR_LANES],
     /// The level of detail of each sample, before the sampler's bias.
     lod: LaneWords,
-    /// The length of each, in normalized coordinates.
+    /// The vector along each footprint, in normalized coordinates.
     length: [[f32; VECTOR_LANES]; 2],
 }
 
-/// Samples along the footprint with what samples once; None if the request is no anisotropic one.
+/// Averages samples along the footprint. `once` takes one isotropic sample. `None` if the request does not use
+/// anisotropic filtering.
 pub(super) fn sample(
     surface: &Surface,
     sampler: &Sampler,
@@ -73,7 +74,7 @@ pub(super) fn sample(
     Some(sums.map(|lanes| lanes.map(f32::to_bits)))
 }
 
-/// The footprints that a request's derivatives mean.
+/// The footprints of a request, computed from its derivatives.
 fn footprints(surface: &Surface, sampler: &Sampler, request: &SampleRequest) -> Footprints {
     let mut footprints = Footprints {
         counts: [1; VECTOR_LANES],
@@ -103,12 +104,12 @@ fn footprints(surface: &Surface, sampler: &Sampler, request: &SampleRequest) -> 
         };
         let (along_x, along_y) = (texels(dx), texels(dy));
         let (longest, shortest) = (along_x.max(along_y), along_x.min(along_y));
-        // Of a footprint without width the ratio is the greatest there is; of one that is no number it is 1.
+        // A footprint of width zero has the greatest ratio. A footprint that is not finite has ratio 1.
         let ratio = match longest.is_finite() && longest > 0.0 {
             true => (longest / shortest).min(sampler.max_anisotropy),
             false => 1.0,
         };
-        // A hair more than a whole number takes no further sample.
+        // A ratio slightly above an integer takes no further sample.
         footprints.counts[lane] = ((ratio - 1e-3).ceil() as u32).max(1);
         let width = longest / ratio;
         let (bias, least) = match &request.lod {
@@ -117,7 +118,7 @@ fn footprints(surface: &Surface, sampler: &Sampler, request: &SampleRequest) -> 
             _ => (0, f32::NEG_INFINITY.to_bits()),
         };
         let lod = lod::half_log2(width * width) + f32::from_bits(bias);
-        // The sampler's bias comes on top.
+        // The sampler's bias is added later.
         let least = f32::from_bits(least) - sampler.mip_lod_bias;
         footprints.lod[lane] = lod.max(least).to_bits();
         let length = if along_x >= along_y { dx } else { dy };

@@ -1,13 +1,13 @@
-//! Cube maps: which face a direction meets, and which texels lie across an edge.
+//! Cube maps: the face that a direction meets, and the texels across an edge.
 
-/// Where a direction meets the cube.
+/// The point in which a direction meets the cube.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Hit {
     /// The face: +x, -x, +y, -y, +z, -z.
     pub face: u32,
-    /// The direction's coordinates on the face, not yet divided by `major`.
+    /// The direction's s coordinate on the face, not yet divided by `major`.
     pub sc: f32,
-    /// See `sc`.
+    /// The direction's t coordinate on the face, not yet divided by `major`.
     pub tc: f32,
     /// The magnitude of the coordinate along the face's axis.
     pub major: f32,
@@ -38,7 +38,7 @@ fn from_face_axes(face: u32, [s, t, outwards]: [f32; 3]) -> [f32; 3] {
 }
 
 impl Hit {
-    /// Where a direction meets the cube; of equal components z wins over y, and y over x.
+    /// The point in which a direction meets the cube. Of equal components z takes precedence over y, and y over x.
     pub fn new(direction: [f32; 3]) -> Self {
         let [x, y, z] = direction;
         let (axis, component) = if z.abs() >= x.abs() && z.abs() >= y.abs() {
@@ -58,7 +58,7 @@ impl Hit {
         }
     }
 
-    /// The coordinates on the face, 0 to 1.
+    /// The coordinates on the face, from 0 to 1.
     pub fn coordinates(&self) -> [f32; 2] {
         [
             0.5 * (self.sc / self.major) + 0.5,
@@ -66,7 +66,7 @@ impl Hit {
         ]
     }
 
-    /// What a change of the direction changes of the coordinates on the face.
+    /// The change of the coordinates on the face for a small change of the direction.
     pub fn derivative(&self, change: [f32; 3]) -> [f32; 2] {
         let [ds, dt, dm] = face_axes(self.face, change);
         let scale = 0.5 / (self.major * self.major);
@@ -77,12 +77,13 @@ impl Hit {
     }
 }
 
-/// The face and texel of (i, j), of which one lies a texel beyond `face`'s `size`.
+/// The face and texel for (i, j), of which one coordinate is a texel outside of `face`, which has `size` texels per
+/// side.
 fn across_edge(face: u32, [i, j]: [i32; 2], size: u32) -> (u32, [u32; 2]) {
-    // In half texels from the face's centre all centres of texels are integers.
+    // In units of half a texel from the face's centre, all texel centres are integers.
     let n = size as f32;
     let [s, t] = [i, j].map(|index| (2 * index + 1) as f32 - n);
-    // What stands over is the face next door; there the texel lies half a texel from the edge.
+    // The part outside folds over to the neighbouring face, where the texel's centre is half a texel from the edge.
     let around = if s.abs() > n {
         [n.copysign(s), t, n - 1.0]
     } else {
@@ -93,8 +94,8 @@ fn across_edge(face: u32, [i, j]: [i32; 2], size: u32) -> (u32, [u32; 2]) {
     (hit.face, [index(hit.sc), index(hit.tc)])
 }
 
-/// The texels of a cube that stand for texel (i, j) of a face, which may lie one beyond its edges: one, or, beyond a
-/// corner, the three around it, whose mean is to be taken.
+/// The texels of a cube for texel (i, j) of a face, which may be outside of it by one: a single texel or, outside of a
+/// corner, the three around the corner, of which the mean is taken. Returns the texels and their number.
 pub(super) fn texels(face: u32, at: [i32; 2], size: u32) -> ([(u32, [u32; 2]); 3], usize) {
     let last = size as i32 - 1;
     let at = at.map(|index| index.clamp(-1, last + 1));

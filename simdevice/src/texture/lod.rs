@@ -1,7 +1,7 @@
-//! Levels of detail: from derivatives to the mip levels that are read.
+//! Levels of detail: selects the mip levels to read from derivatives.
 //!
-//! Vulkan 1.3, "Scale Factor Operation", "LOD Operation" and "Image Level(s) Selection". Plain loops over 16 lanes or
-//! four quads, without fused operations, so that every SIMD level chooses the same levels.
+//! Vulkan 1.3, "Scale Factor Operation", "LOD Operation" and "Image Level(s) Selection". The code has simple loops over
+//! 16 lanes or four quads, without fused operations, so that every SIMD level selects the same levels.
 
 use super::cube::Hit;
 use super::sampler::{Filter, MipmapMode, Sampler};
@@ -11,10 +11,10 @@ use crate::texture::texels::Floats;
 use isa::ir::{Dimension, VECTOR_LANES};
 use isa::resources::{LaneWords, LodRequest, SampleRequest};
 
-/// Quads of a chunk.
+/// The number of quads of 16 lanes.
 pub(super) const QUADS: usize = VECTOR_LANES / 4;
 
-/// The mip levels of four quads, as [`Selection`] has them of lanes.
+/// The mip levels of four quads, with the fields of [`Selection`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct QuadSelection {
     pub high: [u32; QUADS],
@@ -22,7 +22,7 @@ pub(super) struct QuadSelection {
     pub weight: [f32; QUADS],
 }
 
-/// As [`select`], for what asks for [`LodRequest::Automatic`] of an image that is no cube, where one filter serves.
+/// The result of [`select`] for requests of [`LodRequest::Automatic`] for images other than cubes, with one filter.
 #[inline(always)]
 pub(super) fn select_quads(
     surface: &Surface,
@@ -57,18 +57,18 @@ pub(super) fn select_quads(
 /// The mip levels of 16 lanes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Selection {
-    /// The level, or the larger of two.
+    /// The level, or the larger image of two levels.
     pub high: [u32; VECTOR_LANES],
-    /// The smaller of two.
+    /// The smaller image of two levels.
     pub low: [u32; VECTOR_LANES],
-    /// The weight of `low`; if it is zero, `low` isn't read.
+    /// The weight of `low`. If it is zero, `low` is not read.
     pub weight: Floats,
     /// The filter within levels.
     pub filter: [Filter; VECTOR_LANES],
 }
 
 impl Selection {
-    /// The first level for all.
+    /// The first level for all lanes.
     fn base(filter: Filter) -> Self {
         Self {
             high: [0; VECTOR_LANES],
@@ -79,7 +79,7 @@ impl Selection {
     }
 }
 
-/// The filter that a sampler asks for is done only for what can be mixed.
+/// The filter that a sampler requests, or the nearest one for integers, which cannot be averaged.
 fn possible(surface: &Surface, filter: Filter) -> Filter {
     if surface.is_integer() {
         Filter::Nearest
@@ -88,7 +88,7 @@ fn possible(surface: &Surface, filter: Filter) -> Filter {
     }
 }
 
-/// The mip levels and filters that a request means.
+/// The mip levels and filters for a request.
 #[inline(always)]
 pub(super) fn select(surface: &Surface, sampler: &Sampler, request: &SampleRequest) -> Selection {
     let magnify = possible(surface, sampler.mag_filter);
@@ -99,7 +99,7 @@ pub(super) fn select(surface: &Surface, sampler: &Sampler, request: &SampleReque
     }
     let lambda = clamped(sampler, request, &biased(surface, sampler, request));
     let mut selection = Selection::base(magnify);
-    // Integers aren't mixed between levels either.
+    // Integers are not averaged between levels either.
     let linear = sampler.mipmap_mode == MipmapMode::Linear && !surface.is_integer();
     for (lane, lambda) in lambda.iter().enumerate() {
         let level = lambda.clamp(0.0, last as f32);
@@ -120,8 +120,8 @@ pub(super) fn select(surface: &Surface, sampler: &Sampler, request: &SampleReque
     selection
 }
 
-/// The answer to a query: the level that is read, relative to the view's first, and the level of detail before it is
-/// clamped.
+/// The results of a query: the level that would be read, relative to the view's first, and the level of detail before
+/// it is clamped.
 pub(super) fn query(
     surface: &Surface,
     sampler: &Sampler,
@@ -140,7 +140,7 @@ pub(super) fn query(
     [level, biased].map(|lanes| lanes.map(f32::to_bits))
 }
 
-/// The level nearest to `level`, which isn't negative; of two, the larger one.
+/// The level nearest to `level`, which must not be negative. In a tie it is the larger image.
 #[inline(always)]
 fn nearest_level(level: f32) -> u32 {
     let whole = level as u32;
@@ -171,7 +171,7 @@ fn biased(surface: &Surface, sampler: &Sampler, request: &SampleRequest) -> Floa
     biased
 }
 
-/// The level of detail within what sampler and instruction allow; NaN becomes the least.
+/// The level of detail, clamped to the limits of the sampler and the instruction. NaN becomes the minimum.
 #[inline(always)]
 fn clamped(sampler: &Sampler, request: &SampleRequest, biased: &Floats) -> Floats {
     let minimum = match &request.lod {
@@ -187,7 +187,7 @@ fn clamped(sampler: &Sampler, request: &SampleRequest, biased: &Floats) -> Float
     clamped
 }
 
-/// The level of detail of differences within quads: from the first lane to the next, and to the one below.
+/// The level of detail from the differences in quads: from the first lane to its right and lower neighbours.
 #[inline(always)]
 fn implicit(surface: &Surface, request: &SampleRequest) -> Floats {
     let value = |axis: usize, lane: usize| f32::from_bits(request.coordinate[axis][lane]);
@@ -207,7 +207,7 @@ fn implicit(surface: &Surface, request: &SampleRequest) -> Floats {
     lods
 }
 
-/// As [`implicit`], a number for each quad, of images that aren't cubes.
+/// The result of [`implicit`], one number for each quad, for images other than cubes.
 #[inline(always)]
 fn of_quads(surface: &Surface, request: &SampleRequest) -> [f32; QUADS] {
     let value = |axis: usize, lane: usize| f32::from_bits(request.coordinate[axis][lane]);
@@ -230,7 +230,7 @@ fn of_quads(surface: &Surface, request: &SampleRequest) -> [f32; QUADS] {
     lods
 }
 
-/// The level of detail of given changes of the coordinates.
+/// The level of detail for given derivatives of the coordinates.
 fn scale_lod(
     surface: &Surface,
     request: &SampleRequest,
@@ -262,11 +262,11 @@ fn scale_lod(
     half_log2(along(dx).max(along(dy)))
 }
 
-/// Half the base-2 logarithm, to 2e-6, and exact for powers of four; -64 or so for zero, 64 for infinity and NaN. Not of
-/// negative numbers.
+/// Half the base-2 logarithm, to 2e-6, and exact for powers of four. About -64 for zero, 64 for infinity and NaN.
+/// Undefined for negative numbers.
 #[inline(always)]
 pub(super) fn half_log2(x: f32) -> f32 {
-    // The mantissa is taken in [sqrt(1/2), sqrt(2)): less the bits of sqrt(1/2), the exponent field tells.
+    // The mantissa is taken in [sqrt(1/2), sqrt(2)): subtracting the bits of sqrt(1/2) makes the exponent field match.
     const BIAS: i32 = 127 << 23;
     let bits = x.min(f32::MAX).to_bits() as i32;
     let exponent = (bits - std::f32::consts::FRAC_1_SQRT_2.to_bits() as i32 + BIAS) >> 23;
@@ -274,7 +274,7 @@ pub(super) fn half_log2(x: f32) -> f32 {
     let mantissa = f32::from_bits((bits - (exponent << 23)) as u32);
     let s = (mantissa - 1.0) / (mantissa + 1.0);
     let s2 = s * s;
-    // log2(m) / 2 = (s + s^3 / 3 + s^5 / 5 + ...) / ln 2, |s| < 0.1716: what is left out is below 2e-7.
+    // log2(m) / 2 = (s + s^3 / 3 + s^5 / 5 + ...) / ln 2, |s| < 0.1716: the omitted terms are below 2e-7.
     let series = 1.0 + s2 * (1.0 / 3.0 + s2 * (0.2 + s2 * (1.0 / 7.0)));
     0.5 * exponent as f32 + s * series * std::f32::consts::LOG2_E
 }

@@ -1,13 +1,13 @@
-//! The texture unit: what shader cores sample, fetch, read and write of images.
+//! The texture unit: samples, fetches, reads and writes images for the shader cores.
 //!
-//! An [`ImageTable`] holds a draw's images and samplers and answers a program's image instructions
-//! ([`isa::resources::ImageUnit`]), 16 lanes at a time, as the chapter "Image Operations" of the Vulkan
-//! specification says. Weights are binary32 throughout, sRGB is decoded before it is filtered, cubes are seamless.
-//! Hostile coordinates are safe: NaN counts as 0, and everything is bounds-checked.
+//! An [`ImageTable`] holds a draw's images and samplers and executes a program's image instructions
+//! ([`isa::resources::ImageUnit`]), 16 lanes at a time, as the chapter "Image Operations" of the Vulkan specification
+//! defines. Weights are binary32, sRGB is decoded before it is filtered, and cubes are seamless. Any coordinate is
+//! safe: NaN counts as 0, and all accesses are bounds-checked.
 //!
-//! An anisotropic sample (`anisotropy`) is several isotropic ones. There are two ways to take those: lane by lane
-//! (`scalar`), which does everything, and 16 lanes at once (`vector`), which does the common formats. They agree bit for bit, at
-//! every SIMD level.
+//! An anisotropic sample (`anisotropy`) is the mean of several isotropic ones. There are two implementations of those:
+//! lane by lane (`scalar`), which supports everything, and 16 lanes at once (`vector`), which supports the common
+//! formats. They agree bit for bit, at every SIMD level.
 
 mod addressing;
 mod anisotropy;

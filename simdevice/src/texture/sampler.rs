@@ -1,18 +1,18 @@
-//! Samplers: how coordinates become texels and how texels are mixed.
+//! Samplers: the conversion of coordinates to texels, and the filtering of texels.
 
 use crate::state::CompareOp;
 
-/// How texels of one mip level are mixed.
+/// The filter within one mip level.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Filter {
-    /// The texel that the coordinates lie in.
+    /// The texel that contains the coordinates.
     #[default]
     Nearest,
-    /// The weighted mean of the texels around. Integer formats are read as [`Filter::Nearest`].
+    /// The weighted mean of the surrounding texels. Integer formats are read as with [`Filter::Nearest`].
     Linear,
 }
 
-/// How mip levels are mixed.
+/// The filter between mip levels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum MipmapMode {
     /// The nearest level.
@@ -22,29 +22,29 @@ pub enum MipmapMode {
     Linear,
 }
 
-/// What coordinates outside the image mean, along one axis. Cubes have no outside and ignore it.
+/// The treatment of coordinates outside the image, along one axis. Cubes ignore it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum AddressMode {
     /// The image repeats.
     #[default]
     Repeat,
-    /// The image repeats, every other time mirrored.
+    /// The image repeats, and every second copy is mirrored.
     MirroredRepeat,
-    /// The texel at the edge.
+    /// The texel at the edge is repeated.
     ClampToEdge,
-    /// The border colour.
+    /// The border colour is read.
     ClampToBorder,
-    /// The image is mirrored once, then its edge goes on.
+    /// The image is mirrored once, then the texel at the edge is repeated.
     MirrorClampToEdge,
 }
 
-/// What [`AddressMode::ClampToBorder`] reads outside the image: the bits of red, green, blue, alpha. Floats or
-/// integers, as the image's format is. Components that the format lacks read as ever.
+/// The colour that [`AddressMode::ClampToBorder`] reads outside the image: the bits of red, green, blue, alpha. They
+/// are floats or integers, as the image's format is. Components that the format lacks are read as 0, and alpha as 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct BorderColor(pub [u32; 4]);
 
 impl BorderColor {
-    /// Zeros, of any format.
+    /// Zeros, for any format.
     pub const TRANSPARENT_BLACK: Self = Self([0; 4]);
     /// (0, 0, 0, 1), for float formats.
     pub const FLOAT_OPAQUE_BLACK: Self = Self::float([0.0, 0.0, 0.0, 1.0]);
@@ -61,44 +61,44 @@ impl BorderColor {
     }
 }
 
-/// What becomes of the texels that a filter takes together.
+/// The reduction of the texels that a filter reads.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Reduction {
-    /// Their weighted mean.
+    /// The weighted mean.
     #[default]
     WeightedAverage,
-    /// The least of those that have a weight, component by component.
+    /// The least of the texels with a weight, component by component.
     Min,
-    /// The greatest of those that have a weight, component by component.
+    /// The greatest of the texels with a weight, component by component.
     Max,
 }
 
 /// A sampler.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sampler {
-    /// Where an image is magnified: the level of detail is zero or less.
+    /// The filter if the image is magnified: the level of detail is zero or less.
     pub mag_filter: Filter,
-    /// Where it is minified.
+    /// The filter if the image is minified.
     pub min_filter: Filter,
-    /// Between levels.
+    /// The filter between levels.
     pub mipmap_mode: MipmapMode,
-    /// Along u, v and w.
+    /// The address modes along u, v and w.
     pub address_modes: [AddressMode; 3],
-    /// Added to the level of detail.
+    /// The bias that is added to the level of detail.
     pub mip_lod_bias: f32,
     /// The least level of detail.
     pub min_lod: f32,
     /// The greatest level of detail.
     pub max_lod: f32,
-    /// The comparison with a reference value. Only instructions that bring a reference compare.
+    /// The comparison with a reference value. Only instructions with a reference compare.
     pub compare_op: Option<CompareOp>,
-    /// The colour outside.
+    /// The colour outside of the image.
     pub border_color: BorderColor,
-    /// Coordinates count texels of the view's first level, the only one that is read.
+    /// True if coordinates count texels of the view's first level, the only level that is read.
     pub unnormalized_coordinates: bool,
-    /// The most samples along a pixel's footprint; at 1 filtering is isotropic.
+    /// The most samples along a pixel's footprint. With 1, filtering is isotropic.
     pub max_anisotropy: f32,
-    /// What becomes of the texels that are filtered together.
+    /// The reduction of the texels that a filter reads.
     pub reduction: Reduction,
 }
 

@@ -1,6 +1,6 @@
-//! Accesses lane by lane: samples and gathers of any format, shape and sampler, which [`super::vector`] does faster, bit for
-//! bit, where they are common; fetches, reads, writes and atomics. Every one is bounds-checked; what lies outside reads zero,
-//! and writes there vanish.
+//! Image accesses lane by lane: samples and gathers of any format, shape and sampler, fetches, reads, writes and
+//! atomics. [`super::vector`] takes common samples faster, with the same bits. All accesses are bounds-checked: texels
+//! outside are read as zero, and writes to them are ignored.
 
 use super::addressing::{self, Taps};
 use super::cube;
@@ -12,19 +12,19 @@ use isa::combine;
 use isa::ir::{AtomicOp, Dimension, Format as Word, ImageShape, VECTOR_LANES};
 use isa::resources::{LaneWords, SampleRequest, TexelRequest};
 
-/// What is read of an image: where, and through which sampler.
+/// The image, sampler and position of a read.
 struct Reader<'a> {
     surface: &'a Surface,
     sampler: &'a Sampler,
-    /// The border colour as a texel.
+    /// The border colour in the form of a texel.
     border: [u32; 4],
-    /// The reference of a comparison.
+    /// The reference value of a comparison.
     reference: Option<f32>,
     level: usize,
     layer: u32,
 }
 
-/// Filters or gathers for every lane of the mask.
+/// Samples or gathers for every lane of the mask.
 pub(super) fn sample(
     surface: &Surface,
     sampler: &Sampler,
@@ -65,7 +65,7 @@ pub(super) fn sample(
     out
 }
 
-/// The reference value that a lane compares with, if it compares.
+/// The reference value of a lane, if the sampler and the request compare.
 fn reference(
     surface: &Surface,
     sampler: &Sampler,
@@ -77,7 +77,7 @@ fn reference(
     Some(reference_value(unorm, request.compare?[lane]))
 }
 
-/// A reference value from its bits: clamped for unsigned normalized formats.
+/// A reference value from its bits. It is clamped for unsigned normalized formats.
 #[inline(always)]
 pub(super) fn reference_value(unorm: bool, bits: u32) -> f32 {
     let reference = f32::from_bits(bits);
@@ -88,7 +88,7 @@ pub(super) fn reference_value(unorm: bool, bits: u32) -> f32 {
     }
 }
 
-/// The border colour as a texel of the format: what it lacks is as ever.
+/// The border colour in the form of a texel. Components that the format lacks are 0, and alpha is 1.
 pub(super) fn border_texel(surface: &Surface, sampler: &Sampler) -> [u32; 4] {
     let BorderColor([r, g, b, a]) = sampler.border_color;
     let format = surface.format;
@@ -104,14 +104,14 @@ pub(super) fn border_texel(surface: &Surface, sampler: &Sampler) -> [u32; 4] {
     ]
 }
 
-/// The texels around a point of one level.
+/// The texels around a point in one level.
 enum Footprint {
-    /// Of an image with edges: along x, y and z.
+    /// The texels of an image with edges, along x, y and z.
     Grid {
         axes: [Taps; 3],
         filters: [Filter; 3],
     },
-    /// Of a cube: the face, the first texel, and weights.
+    /// The texels of a cube: the face, the first texel, and weights.
     Cube {
         face: u32,
         first: [i32; 2],
@@ -121,7 +121,7 @@ enum Footprint {
 }
 
 impl Reader<'_> {
-    /// The texels that a lane's coordinates mean. Sets the layer.
+    /// The texels for a lane's coordinates. It also sets the layer.
     fn footprint(&mut self, request: &SampleRequest, lane: usize, filter: Filter) -> Footprint {
         let coordinate = request.coordinate.map(|lanes| f32::from_bits(lanes[lane]));
         let dimension = request.shape.dimension;
@@ -171,7 +171,7 @@ impl Reader<'_> {
         }
     }
 
-    /// A texel, or what stands for it; compared, if that is asked for.
+    /// A texel or the border colour. If a comparison is requested, red is its result.
     fn texel(&self, at: [Option<u32>; 3], layer: u32) -> [u32; 4] {
         let texel = match at {
             [Some(x), Some(y), Some(z)] => {
@@ -194,7 +194,7 @@ impl Reader<'_> {
         }
     }
 
-    /// A texel of a cube's face, or what stands for it beyond an edge.
+    /// A texel of a cube's face, or the one that replaces it beyond an edge.
     fn cube_texel(&self, face: u32, at: [i32; 2]) -> [u32; 4] {
         let size = self.surface.levels[self.level].extent[0];
         let (texels, count) = cube::texels(face, at, size);
@@ -217,7 +217,7 @@ impl Reader<'_> {
 }
 
 impl Footprint {
-    /// The weighted mean.
+    /// The weighted mean, or another reduction, of the texels.
     fn filter(&self, reader: &Reader<'_>) -> [u32; 4] {
         let reduction = reader.sampler.reduction;
         match self {
@@ -270,7 +270,7 @@ impl Footprint {
     }
 }
 
-/// Mixes two texels along an axis, or takes the first.
+/// Filters two texels along an axis, or takes the first.
 fn along(
     reduction: Reduction,
     filter: Filter,
@@ -302,7 +302,7 @@ fn mix(reduction: Reduction, a: [u32; 4], b: [u32; 4], weight: f32) -> [u32; 4] 
     }
 }
 
-/// The texel that a lane means.
+/// The position of the texel that a lane accesses.
 fn place(shape: ImageShape, request: &TexelRequest, lane: usize) -> Texel {
     let [x, y, z, w] = request.coordinate.map(|lanes| lanes[lane]);
     let (at, layer) = match (shape.dimension, shape.arrayed) {
@@ -321,7 +321,7 @@ fn place(shape: ImageShape, request: &TexelRequest, lane: usize) -> Texel {
     Texel { at, layer, sample }
 }
 
-/// The lanes that take part, in order.
+/// The active lanes, in order.
 fn lanes(request: &TexelRequest) -> impl Iterator<Item = usize> {
     let mask = request.mask;
     (0..VECTOR_LANES).filter(move |lane| mask >> lane & 1 != 0)
@@ -341,7 +341,7 @@ pub(super) fn read(surface: &Surface, request: &TexelRequest) -> [LaneWords; 4] 
     out
 }
 
-/// Writes texels.
+/// Writes texels. Nothing is written to a surface that is not writable.
 pub(super) fn write(surface: &Surface, request: &TexelRequest, texel: &[LaneWords; 4]) {
     if !surface.writable {
         return;
@@ -355,7 +355,7 @@ pub(super) fn write(surface: &Surface, request: &TexelRequest, texel: &[LaneWord
     }
 }
 
-/// Stores a texel's bytes. Where a texel is a machine word, one of its writers wins whole.
+/// Stores a texel's bytes. A texel of at most 8 bytes, if their number is a power of two, is stored atomically.
 fn store(surface: &Surface, offset: u64, bytes: &[u8; 16]) {
     let memory = &surface.memory;
     let [a, b, c, d, e, f, g, h, ..] = *bytes;
@@ -367,12 +367,13 @@ fn store(surface: &Surface, offset: u64, bytes: &[u8; 16]) {
         _ => None,
     };
     if stored.is_none() {
-        // The offset was found within the surface, so that this cannot miss the memory.
+        // The offset lies in the surface, so that this cannot fail.
         let _ = memory.write(offset, &bytes[..surface.texel_size]);
     }
 }
 
-/// Updates texels of one 32-bit component; returns the old values. Other formats read zero and keep what they have.
+/// Updates texels of one 32-bit component, and returns the old values. For other formats it returns zero and changes
+/// nothing.
 pub(super) fn atomic(
     surface: &Surface,
     request: &TexelRequest,

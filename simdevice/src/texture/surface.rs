@@ -1,4 +1,4 @@
-//! A bound image made ready: where each texel lies in memory, and how it is read.
+//! Surfaces: bound images with the memory layout of their texels and the way to decode them.
 
 use devmem::Allocation;
 use std::sync::Arc;
@@ -8,18 +8,18 @@ use super::view::{ComponentSwizzle, IDENTITY, SampledImage, StorageImage, Swizzl
 use crate::format::{Aspect, Channel, Format, MAX_TEXEL_SIZE};
 use crate::image::ImageView;
 
-/// Larger images are read lane by lane: up to here, texel indices are exact as floats.
+/// The largest extent that is read 16 lanes at a time: texel indices up to it are exact as floats.
 const MAX_EXTENT: u32 = 1 << 16;
 
-/// Every image begins at a multiple of as many bytes as the largest texel has.
+/// The alignment of images in bytes: the size of the largest texel.
 const ALIGNMENT: u64 = 16;
 
-/// A mip level of a view: extents in texels, places and pitches in bytes.
+/// A mip level of a view. Extents are in texels, offset and pitches in bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Level {
-    /// Width, height, depth; at least 1 but for empty buffers.
+    /// The width, height and depth. They are at least 1, except for empty buffers.
     pub extent: [u32; 3],
-    /// From the memory's beginning to the first layer's first texel.
+    /// The distance from the memory's beginning to the first texel of the first layer.
     pub offset: u64,
     pub row_pitch: u64,
     pub depth_pitch: u64,
@@ -27,7 +27,7 @@ pub(super) struct Level {
     pub layer_pitch: u64,
 }
 
-/// Where a texel is: x, y, z, layer, sample.
+/// The position of a texel: x, y, z, layer, sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Texel {
     pub at: [u32; 3],
@@ -35,33 +35,33 @@ pub(super) struct Texel {
     pub sample: u32,
 }
 
-/// See the module.
+/// A bound image, prepared for access.
 #[derive(Clone, Debug)]
 pub(super) struct Surface {
     pub memory: Arc<Allocation>,
-    /// How texels are read: one aspect's format.
+    /// The format of the texels, which is that of one aspect.
     pub format: Format,
     pub texel_size: usize,
-    /// The view's levels, the largest first; at least one.
+    /// The view's levels, from the largest on. There is at least one.
     pub levels: Vec<Level>,
     pub layers: u32,
     pub samples: u32,
     pub swizzle: Swizzle,
-    /// How 16 texels are decoded at once, if that is known.
+    /// The layout for decoding 16 texels at once, if the format has one.
     pub layout: Option<VectorLayout>,
-    /// Texels may be written.
+    /// True if texels may be written.
     pub writable: bool,
 }
 
 impl Surface {
-    /// A sampled image; None if the view has no texels of this aspect and format.
+    /// The surface of a sampled image; `None` if the view has no texels of this aspect and format.
     pub fn sampled(image: &SampledImage) -> Option<Self> {
         let mut surface = Self::image(&image.view, image.aspect)?;
         surface.swizzle = image.swizzle;
         Some(surface)
     }
 
-    /// A storage image; None if the view has no texels of this format.
+    /// The surface of a storage image; `None` if the view has no texels of this format.
     pub fn storage(image: &StorageImage) -> Option<Self> {
         let mut surface = Self::image(&image.view, Aspect::Color)?;
         surface.writable = true;
@@ -110,7 +110,7 @@ impl Surface {
         Some(surface)
     }
 
-    /// How its texels are read 16 at a time; None if they are to be read one by one.
+    /// The layout for reading 16 texels at a time; `None` if they must be read one by one.
     fn find_layout(&self) -> Option<VectorLayout> {
         let codec = TexelCodec::of(self.format)?;
         let begin = self.levels.iter().map(|level| level.offset).min()?;
@@ -161,7 +161,7 @@ impl Surface {
         })
     }
 
-    /// A texel buffer: one row. None if the range doesn't lie within its memory.
+    /// The surface of a texel buffer: one row. `None` if the range does not lie within its memory.
     pub fn buffer(buffer: &TexelBuffer) -> Option<Self> {
         let range = &buffer.range;
         let end = range.offset.checked_add(range.size)?;
@@ -190,7 +190,7 @@ impl Surface {
         })
     }
 
-    /// The byte at which a texel begins; None if there is no such texel.
+    /// The byte offset of a texel; `None` if there is no such texel.
     #[inline]
     pub fn offset(&self, level: usize, texel: Texel) -> Option<u64> {
         let level = self.levels.get(level)?;
@@ -210,7 +210,7 @@ impl Surface {
         })
     }
 
-    /// A texel's registers, not swizzled; None if there is no such texel.
+    /// The components of a texel, not swizzled; `None` if there is no such texel.
     pub fn texel(&self, level: usize, texel: Texel) -> Option<[u32; 4]> {
         let mut bytes = [0; MAX_TEXEL_SIZE];
         let bytes = &mut bytes[..self.texel_size];
@@ -219,7 +219,7 @@ impl Surface {
         Some(self.format.decode(bytes).map(f32::to_bits))
     }
 
-    /// What is read outside the image: a texel of zeros, with what its format lacks.
+    /// The texel that is read outside the image: zeros, with the default for an alpha that the format lacks.
     pub fn outside(&self) -> [u32; 4] {
         let bytes = [0; MAX_TEXEL_SIZE];
         let zeros = &bytes[..self.texel_size];
@@ -229,23 +229,23 @@ impl Surface {
         }
     }
 
-    /// What a component that isn't there is, or a swizzle's one.
+    /// The value 1 of a component: that of a missing alpha, or of a swizzle's one.
     pub fn one(&self) -> u32 {
         if self.is_integer() { 1 } else { 1f32.to_bits() }
     }
 
-    /// Whether registers hold integers, which are never mixed.
+    /// True if components are integers, which are never averaged.
     pub fn is_integer(&self) -> bool {
         self.format.is_integer()
     }
 
-    /// Registers as a program gets them.
+    /// The components of a texel after swizzling.
     pub fn swizzled(&self, texel: [u32; 4]) -> [u32; 4] {
         let one = self.one();
         self.swizzle.map(|from| from.pick(&texel, 0, one))
     }
 
-    /// One swizzled component.
+    /// One component of a texel after swizzling.
     pub fn component(&self, texel: &[u32; 4], component: u8) -> u32 {
         let from = self.swizzle.get(usize::from(component));
         from.unwrap_or(&ComponentSwizzle::Zero)

@@ -1,4 +1,4 @@
-//! The image unit: what a program's image and sampler slots are bound to.
+//! The image unit: the images and samplers that are bound to a program's slots.
 
 use devmem::dispatch;
 use fearless_simd::Level;
@@ -10,10 +10,10 @@ use super::{anisotropy, lod, scalar, vector};
 use isa::ir::{AtomicOp, Dimension, ImageShape};
 use isa::resources::{ImageUnit, LaneWords, SampleRequest, TexelRequest};
 
-/// The images and samplers of a draw or a dispatch, by the slots that its program names.
+/// The images and samplers of a draw or a dispatch, by slot.
 ///
-/// Where texels lie and how they are decoded is worked out once, when the table is made. The table doesn't mark memory
-/// that it writes as changed: that is up to whoever executes the draw (see [`devmem::Allocation::bump_generation`]).
+/// The layout and decoding of texels are determined once, when the table is made. The table does not mark memory that
+/// it writes as changed: the code that executes the draw must do so (see [`devmem::Allocation::bump_generation`]).
 #[derive(Clone, Debug)]
 pub struct ImageTable {
     level: Level,
@@ -23,7 +23,7 @@ pub struct ImageTable {
 }
 
 impl ImageTable {
-    /// A table of what slots 0.. are bound to. An image that its memory doesn't hold is as if it were not bound.
+    /// A table of the bindings of slots 0 and up. An image that does not fit into its memory counts as unbound.
     pub fn new(
         level: Level,
         images: impl IntoIterator<Item = ImageBinding>,
@@ -43,7 +43,7 @@ impl ImageTable {
         }
     }
 
-    /// The same table, but every lane is filtered by itself: the same bits, slower. For tests.
+    /// The same table, but every lane is filtered by itself: slower, with the same bits. For tests.
     #[must_use]
     pub fn lane_by_lane(mut self) -> Self {
         self.batched = false;
@@ -54,7 +54,7 @@ impl ImageTable {
         self.surfaces.get(image as usize)?.as_ref()
     }
 
-    /// An isotropic sample.
+    /// Takes an isotropic sample.
     #[inline]
     fn sample_once(
         &self,

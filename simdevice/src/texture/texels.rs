@@ -1,7 +1,7 @@
-//! Texels of 16 lanes at once: how the common formats lie in words, and their decoding.
+//! Texels of 16 lanes at once: the layout of the common formats in words, and their decoding.
 //!
-//! Decoding gives the same bits as [`crate::Format::decode`]. Vectors stay out of closures: one that isn't inlined would
-//! be compiled without the SIMD level's instructions.
+//! Decoding gives the same bits as [`crate::Format::decode`]. Vectors are not used in closures: a closure that is not
+//! inlined would be compiled without the SIMD level's instructions.
 
 use std::ops::Range;
 use std::sync::LazyLock;
@@ -16,7 +16,7 @@ use crate::format::unorm8::unorm8_fraction_8;
 use isa::ir::VECTOR_LANES;
 use isa::resources::LaneWords;
 
-/// How texels lie in words.
+/// The encoding of texels in words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum TexelCodec {
     Unorm8,
@@ -29,7 +29,8 @@ pub(super) enum TexelCodec {
     Float32x4,
 }
 
-/// A mip level: extents in texels; place and pitches in texels, from the first of `VectorLayout::words`.
+/// A mip level. Its extent is in texels, and its base and pitches in texels from the beginning of
+/// `VectorLayout::words`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct PackedLevel {
     pub extent: [u32; 3],
@@ -39,19 +40,19 @@ pub(super) struct PackedLevel {
     pub layer_pitch: u32,
 }
 
-/// How the texels of a surface are read 16 at a time.
+/// The layout for reading 16 texels of a surface at a time.
 #[derive(Clone, Debug)]
 pub(super) struct VectorLayout {
     pub codec: TexelCodec,
-    /// The words of the memory that the surface begins and ends within.
+    /// The range of words of the memory that contains the surface.
     pub words: Range<usize>,
     pub levels: Vec<PackedLevel>,
-    /// For red, green, blue and alpha, which stored component it is.
+    /// The index of the stored component for red, green, blue and alpha.
     pub order: [usize; 4],
 }
 
 impl VectorLayout {
-    /// The words that texels are read from, of the memory of the surface.
+    /// The words of the surface's memory from which texels are read.
     #[inline]
     pub fn words<'a>(&self, memory: &'a Allocation) -> &'a [AtomicU32] {
         memory.words().get(self.words.clone()).unwrap_or_default()
@@ -59,7 +60,7 @@ impl VectorLayout {
 }
 
 impl TexelCodec {
-    /// The codec of a format; None if its texels are to be read one by one.
+    /// The codec of a format; `None` if its texels must be read one by one.
     pub fn of(format: Format) -> Option<Self> {
         Some(match format {
             Format::R8Unorm => Self::Unorm8,
@@ -81,14 +82,14 @@ impl TexelCodec {
 
 /// Two columns and two rows of texels for each of 16 lanes.
 pub(super) struct Rows<'a> {
-    /// The first texel of the lane's level, layer and slice.
+    /// The index of the first texel of each lane's level, layer and slice.
     pub base: LaneWords,
     pub row_pitch: LaneWords,
     pub x: &'a [LaneWords; 2],
     pub y: &'a [LaneWords; 2],
 }
 
-/// Calls a kernel for a [`TexelCodec`], compiled on its own.
+/// Calls a kernel for a [`TexelCodec`]. Each is compiled on its own.
 macro_rules! for_codec {
     ($simd:expr, $codec:expr, $kernel:ident($($argument:expr),*)) => {
         match $codec {
@@ -111,7 +112,7 @@ macro_rules! for_codec {
 }
 
 impl TexelCodec {
-    /// How many components are stored.
+    /// The number of components that are stored.
     pub fn components(self) -> usize {
         match self {
             Self::Unorm8 | Self::Unorm16 | Self::Float32 => 1,
@@ -120,7 +121,7 @@ impl TexelCodec {
         }
     }
 
-    /// The stored components of texels in column `i` and row `j` of two.
+    /// The stored components of the texels in column `i` and row `j`, each 0 or 1.
     #[inline(always)]
     pub fn load<S: Simd>(
         self,
@@ -193,14 +194,14 @@ fn bilinear<S: Simd, T: Texels>(
     out
 }
 
-/// Four texels around each of 16 points.
+/// The four texels around each of 16 points.
 #[derive(Clone, Copy)]
 pub(super) struct Footprint2x2<S: Simd> {
-    /// Where the upper and the lower row begin.
+    /// The indices at which the upper and the lower row begin.
     pub rows: [u32x16<S>; 2],
     /// The left and the right column.
     pub columns: [u32x16<S>; 2],
-    /// Of the right column, and of the lower row.
+    /// The weights of the right column and of the lower row.
     pub weights: [f32x16<S>; 2],
 }
 
@@ -209,7 +210,7 @@ impl<S: Simd> Footprint2x2<S> {
     #[inline(always)]
     pub fn filter<T: Texels>(&self, simd: S, words: &[AtomicU32]) -> [f32x16<S>; 4] {
         let ([top, bottom], [left, right], [x, y]) = (self.rows, self.columns, self.weights);
-        // Half the lanes at a time, for which most processors have enough registers.
+        // Half of the lanes at a time, because most processors have enough registers for those only.
         let (top, bottom) = (top.split(), bottom.split());
         let (left, right) = (left.split(), right.split());
         let (x, y) = (x.split(), y.split());
@@ -235,7 +236,7 @@ impl<S: Simd> Footprint2x2<S> {
     }
 }
 
-/// As [`Footprint2x2`], of eight points.
+/// The four texels around each of eight points; see [`Footprint2x2`].
 struct Half<S: Simd> {
     rows: [u32x8<S>; 2],
     columns: [u32x8<S>; 2],
@@ -261,7 +262,7 @@ impl<S: Simd> Half<S> {
     }
 }
 
-/// Where the lanes' row `j` of two begins.
+/// The indices at which row `j`, 0 or 1, of each lane begins.
 #[inline(always)]
 fn row_start<S: Simd>(simd: S, rows: &Rows<'_>, j: usize) -> u32x16<S> {
     let y = u32x16::simd_from(simd, rows.y[j]);
@@ -270,14 +271,14 @@ fn row_start<S: Simd>(simd: S, rows: &Rows<'_>, j: usize) -> u32x16<S> {
 
 /// A [`TexelCodec`] as a type.
 pub(super) trait Texels {
-    /// How many components are stored.
+    /// The number of components that are stored.
     const COMPONENTS: usize;
 
-    /// The stored components of texels; those beyond [`Texels::COMPONENTS`] are zero.
+    /// The stored components of texels. Those beyond [`Texels::COMPONENTS`] are zero.
     fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x8<S>) -> [f32x8<S>; 4];
 }
 
-/// Of texels smaller than a word: their bits, moved to the low end.
+/// Gathers the bits of texels smaller than a word, and shifts them to the low end.
 #[inline(always)]
 fn gather_narrow<S: Simd>(
     simd: S,
@@ -290,7 +291,7 @@ fn gather_narrow<S: Simd>(
     word >> shift
 }
 
-/// Linear values of sRGB codes.
+/// The linear values of sRGB codes.
 static LINEAR: LazyLock<[f32; 256]> =
     LazyLock::new(|| std::array::from_fn(|code| Format::R8Srgb.decode(&[code as u8])[0]));
 
@@ -391,14 +392,14 @@ fn float16<S: Simd>(simd: S, bits: u32x8<S>) -> f32x8<S> {
     let splat = |word: u32| u32x8::splat(simd, word);
     let sign = (bits & 0x8000) << 16;
     let half = bits & 0x7FFF;
-    // In binary32's place, the exponent still has binary16's bias.
+    // The exponent is in binary32's position, still with binary16's bias.
     let shifted = half << 13;
     let normal = shifted + ((127 - 15) << 23);
-    // A denormal number stands below a leading one that it doesn't have. No operand is denormal, which would be slow.
+    // A denormal number gets a leading one, which is then subtracted. No operand is denormal, because those are slow.
     let least = splat((127 - 14) << 23);
     let denormal = (shifted + least).bitcast::<f32x8<S>>() - least.bitcast::<f32x8<S>>();
     let infinity = splat(0x7C00);
-    // NaN's mantissa is kept, and made quiet.
+    // The mantissa of a NaN is kept, and the NaN made quiet.
     let quiet = half.simd_gt(infinity).select(splat(1 << 22), splat(0));
     let special = shifted | splat(0x7F80_0000) | quiet;
     let magnitude = half.simd_ge(infinity).select(special, normal);
@@ -461,7 +462,7 @@ mod tests {
     use crate::runtime::SimdLevel;
     use devmem::dispatch;
 
-    /// Texels 0.. of these words, as a layout and as their format decodes them.
+    /// Asserts that the texels in these words decode to the same values as by their format's decoder.
     fn agree<T: Texels>(format: Format, words: &[u32]) {
         let atomics: Vec<AtomicU32> = words.iter().copied().map(AtomicU32::new).collect();
         let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();

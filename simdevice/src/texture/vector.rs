@@ -1,11 +1,13 @@
-//! Samples of 16 lanes at once. The bits are those of [`super::scalar`], which does what this cannot; nothing here is
-//! fused, so that every SIMD level gives them.
+//! Samples of 16 lanes at once. The bits are those of [`super::scalar`], which handles requests that this module does
+//! not. No operations are fused, so that every SIMD level gives the same bits.
 //!
-//! [`bilinear`] takes plain samples, by far the most: of 2D images of four bytes a texel, linear within levels, where quads
-//! alone choose the levels. Everything stays in vectors there, from the coordinates to the registers.
+//! [`bilinear`] handles plain samples, by far the most frequent: of 2D images with four bytes per texel, linear within
+//! levels, with the same level for each lane of a quad. All values stay in vectors, from the coordinates to the
+//! results.
 //!
-//! In [`general`] work goes in phases that hand arrays to each other: levels of detail, the texels along each axis, the texels'
-//! contents and their mean. Only the first depends on everything, so that few kernels are compiled for each SIMD level.
+//! [`general`] works in phases that pass arrays to each other: levels of detail, the texels along each axis, the
+//! texels' contents and their mean. Only the first phase depends on all parameters, so that few kernels are compiled
+//! for each SIMD level.
 
 use std::sync::atomic::AtomicU32;
 
@@ -30,18 +32,18 @@ use isa::resources::{LaneWords, LodRequest, SampleRequest};
 /// The components of 16 texels.
 type Components = [Floats; 4];
 
-/// What a request reads, and how.
+/// The inputs of sampling for a request.
 struct Batch<'a, S> {
     simd: S,
     surface: &'a Surface,
     layout: &'a VectorLayout,
     sampler: &'a Sampler,
     request: &'a SampleRequest,
-    /// The comparison that is asked for.
+    /// The comparison and its reference values, if it is requested.
     reference: Option<(CompareOp, Floats)>,
 }
 
-/// Filters for all lanes; None if this request has to be filtered lane by lane.
+/// Filters for all lanes; `None` if this request must be filtered lane by lane.
 #[inline(always)]
 pub(super) fn general<S: Simd>(
     simd: S,
@@ -77,7 +79,7 @@ pub(super) fn general<S: Simd>(
 }
 
 impl<S: Simd> Batch<'_, S> {
-    /// Stored components as a program gets them.
+    /// The result registers for stored components: reordered, completed and swizzled.
     #[inline(always)]
     fn registers(&self, texels: &Components) -> [LaneWords; 4] {
         let components = self.layout.codec.components();
@@ -95,7 +97,7 @@ impl<S: Simd> Batch<'_, S> {
         out
     }
 
-    /// With the filter that each lane asks for.
+    /// Filters with the filter that each lane selects.
     #[inline(always)]
     fn select_filter(&self, selection: &Selection) -> Option<Components> {
         let first = selection.filter[0];
@@ -117,7 +119,7 @@ impl<S: Simd> Batch<'_, S> {
         Some(texels)
     }
 
-    /// Mixed between levels.
+    /// Filters in one or two levels, and averages between them.
     #[inline(always)]
     fn select_levels(&self, selection: &Selection, filter: Filter) -> Option<Components> {
         let high = self.filter_level(&selection.high, filter)?;
@@ -129,7 +131,7 @@ impl<S: Simd> Batch<'_, S> {
         let mut texels = mix(&high, &low, &selection.weight);
         for (texel, high) in texels.iter_mut().zip(&high) {
             for lane in 0..VECTOR_LANES {
-                // A level of weight zero isn't read, though it be infinite.
+                // A level of weight zero is not read, so that infinities in it have no effect.
                 texel[lane] = if selection.weight[lane] > 0.0 {
                     texel[lane]
                 } else {
@@ -140,7 +142,8 @@ impl<S: Simd> Batch<'_, S> {
         Some(texels)
     }
 
-    /// Of one level for each lane; None if some lie across the edge of a cube's face. Compiled on its own.
+    /// Filters in one level for each lane; `None` if some texels are across the edge of a cube's face. The kernel is
+    /// compiled on its own.
     #[inline(always)]
     fn filter_level(&self, levels: &LaneWords, filter: Filter) -> Option<Components> {
         self.simd.vectorize(
@@ -212,7 +215,7 @@ impl<S: Simd> Batch<'_, S> {
         Some(mix(&slice, &next, &z.weight))
     }
 
-    /// Where the lanes' directions meet a cube: the face, and the coordinates on it.
+    /// The faces that the lanes' directions meet, and the coordinates on them.
     #[inline(always)]
     fn faces(&self) -> (LaneWords, [LaneWords; 4]) {
         let mut faces = [0; VECTOR_LANES];
@@ -227,7 +230,7 @@ impl<S: Simd> Batch<'_, S> {
         (faces, coordinate)
     }
 
-    /// The layer of each lane; None if it is the first for all.
+    /// The layer of each lane; `None` if it is the first for all.
     #[inline(always)]
     fn layers(&self, faces: Option<&LaneWords>) -> Option<LaneWords> {
         let shape = self.request.shape;
@@ -260,7 +263,7 @@ impl<S: Simd> Batch<'_, S> {
         };
         let coordinate = &coordinate[number];
         if self.request.shape.dimension == Dimension::Cube {
-            // What lies across an edge is found out here, and done lane by lane.
+            // Texels across an edge are detected by the border mode, and the request is then filtered lane by lane.
             let mode = match filter {
                 Filter::Nearest => AddressMode::ClampToEdge,
                 Filter::Linear => AddressMode::ClampToBorder,
@@ -279,7 +282,7 @@ impl<S: Simd> Batch<'_, S> {
         )
     }
 
-    /// Of one slice, which lanes have as far as they are `within`.
+    /// Filters in one slice. Lanes outside of `within` read the border.
     #[inline(always)]
     fn filter_slice(
         &self,
@@ -291,7 +294,7 @@ impl<S: Simd> Batch<'_, S> {
         let dimension = self.request.shape.dimension;
         let words = self.layout.words(&self.surface.memory);
         let bordered = x.has_outside || y.has_outside || within[0] != u16::MAX;
-        // A cube's outside is that of lanes that nobody asks for.
+        // For a cube, only inactive lanes can be outside here.
         let plain = self.reference.is_none() && (!bordered || dimension == Dimension::Cube);
         if filter == Filter::Linear && dimension != Dimension::D1 && plain {
             let codec = self.layout.codec;
@@ -309,7 +312,8 @@ impl<S: Simd> Batch<'_, S> {
         }
     }
 
-    /// Components (i, j) of those around, or the border's where they aren't `inside`; compared, if that is asked for.
+    /// The components of texel (i, j) of those around each point. Lanes that are not `inside` get the border. If a
+    /// comparison is requested, the first component is its result.
     #[inline(always)]
     fn texels(
         &self,
@@ -336,11 +340,11 @@ impl<S: Simd> Batch<'_, S> {
     }
 }
 
-/// The mip level of each lane.
+/// The sizes of each lane's mip level.
 struct LevelSizes<'a> {
     table: &'a [PackedLevel],
     levels: &'a LaneWords,
-    /// The level of all lanes, if it is one.
+    /// The level of all lanes, if it is the same.
     uniform: Option<&'a PackedLevel>,
 }
 
@@ -356,7 +360,7 @@ impl<'a> LevelSizes<'a> {
         }
     }
 
-    /// A number of each lane's level.
+    /// A property of each lane's level.
     #[inline(always)]
     fn of(&self, value: impl Fn(&PackedLevel) -> u32) -> LaneWords {
         match self.uniform {
@@ -366,7 +370,7 @@ impl<'a> LevelSizes<'a> {
     }
 }
 
-/// Moves texels on by some steps.
+/// Advances texel indices by a number of steps of `pitch`.
 #[inline(always)]
 fn advance(base: &mut LaneWords, steps: &LaneWords, pitch: &LaneWords) {
     for lane in 0..VECTOR_LANES {
@@ -374,7 +378,7 @@ fn advance(base: &mut LaneWords, steps: &LaneWords, pitch: &LaneWords) {
     }
 }
 
-/// Replaces depths by 1 where a comparison holds, else 0.
+/// Replaces depths by 1 if the comparison holds, and by 0 otherwise.
 #[inline(always)]
 fn compare(op: CompareOp, reference: &Floats, depths: &mut Floats) {
     let mut each = |holds: fn(f32, f32) -> bool| {
@@ -411,7 +415,7 @@ fn mix(a: &Components, b: &Components, weight: &Floats) -> Components {
     mixed
 }
 
-/// Filters for all lanes; None if the request isn't plain.
+/// Filters for all lanes; `None` if the request is not plain.
 #[inline(always)]
 pub(super) fn bilinear<S: Simd>(
     simd: S,
@@ -436,7 +440,7 @@ pub(super) fn bilinear<S: Simd>(
     }
 }
 
-/// Whether there is nothing but to filter.
+/// True if a request needs nothing but bilinear filtering and mip levels per quad.
 #[inline(always)]
 fn is_plain(sampler: &Sampler, request: &SampleRequest) -> bool {
     let shape = request.shape;
@@ -474,7 +478,7 @@ fn filter<S: Simd, T: Texels>(
         let low = level::<S, T>(simd, words, layout, sampler, request, &selection.low);
         let weight = spread(simd, selection.weight);
         for c in 0..T::COMPONENTS {
-            // Texels are finite, so that a weight of zero takes nothing.
+            // Texels are finite, so that a weight of zero has no effect.
             texel[c] = texel[c] + weight * (low[c] - texel[c]);
         }
     }
@@ -528,7 +532,7 @@ fn level<S: Simd, T: Texels>(
     around.filter::<T>(simd, words)
 }
 
-/// A number of each level. (The standard library's `map` is not always inlined.)
+/// A property of each level. (The standard library's `map` is not always inlined.)
 #[inline(always)]
 fn of_each<T: Copy + Default>(
     levels: [&PackedLevel; QUADS],
@@ -541,14 +545,14 @@ fn of_each<T: Copy + Default>(
     values
 }
 
-/// As [`spread`], of integers.
+/// The result of [`spread`], for integers.
 #[inline(always)]
 fn spread_words<S: Simd>(simd: S, [a, b, c, d]: [u32; QUADS]) -> u32x16<S> {
     let upper = u32x4::splat(simd, a).combine(u32x4::splat(simd, b));
     upper.combine(u32x4::splat(simd, c).combine(u32x4::splat(simd, d)))
 }
 
-/// Stored components, of which there are four, as a program gets them.
+/// The result registers for four stored components: reordered and swizzled.
 #[inline(always)]
 fn registers<S: Simd>(
     surface: &Surface,

@@ -1,10 +1,10 @@
-//! What an image bind point may hold: plain data, as a descriptor set has it.
+//! The bindings of image slots: plain data that correspond to descriptors.
 
 use crate::format::{Aspect, Format};
 use crate::image::ImageView;
 use crate::packet::BufferRange;
 
-/// Where a component that a program reads comes from.
+/// The source of a component that a program reads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ComponentSwizzle {
     /// 0.
@@ -22,7 +22,7 @@ pub enum ComponentSwizzle {
 }
 
 impl ComponentSwizzle {
-    /// The component's value of a texel's registers.
+    /// The component's value, given the components of a texel and the values of zero and one.
     #[inline(always)]
     pub(super) fn pick<T: Copy>(self, texel: &[T; 4], zero: T, one: T) -> T {
         match self {
@@ -36,10 +36,10 @@ impl ComponentSwizzle {
     }
 }
 
-/// Where red, green, blue and alpha come from.
+/// The sources of red, green, blue and alpha.
 pub type Swizzle = [ComponentSwizzle; 4];
 
-/// Components as they are.
+/// The swizzle that changes nothing.
 pub const IDENTITY: Swizzle = [
     ComponentSwizzle::Red,
     ComponentSwizzle::Green,
@@ -47,38 +47,38 @@ pub const IDENTITY: Swizzle = [
     ComponentSwizzle::Alpha,
 ];
 
-/// An image that is sampled or fetched from, or an input attachment. The instruction says of what kind it is
-/// ([`isa::ir::ImageShape`]); a cube's faces are six consecutive layers.
+/// An image that is sampled or fetched from, or an input attachment. The instruction determines its kind
+/// ([`isa::ir::ImageShape`]). A cube's faces are six consecutive layers.
 #[derive(Clone, Debug)]
 pub struct SampledImage {
-    /// Its subresources.
+    /// The view of its subresources.
     pub view: ImageView,
-    /// Which of them are read.
+    /// The aspect that is read.
     pub aspect: Aspect,
-    /// How components are rearranged.
+    /// The swizzle of its components.
     pub swizzle: Swizzle,
 }
 
-/// An image that is read, written and updated texel by texel. Of a view with several levels only the first is reached.
+/// An image that is read, written and updated texel by texel. Only the first level of its view is accessible.
 #[derive(Clone, Debug)]
 pub struct StorageImage {
-    /// Its subresources.
+    /// The view of its subresources.
     pub view: ImageView,
 }
 
 /// A buffer of texels: uniform or storage.
 #[derive(Clone, Debug)]
 pub struct TexelBuffer {
-    /// Where the texels are; what is left over at the end is not reached.
+    /// The memory of the texels. An incomplete texel at the end is not accessible.
     pub range: BufferRange,
-    /// How they are stored.
+    /// The format of the texels.
     pub format: Format,
 }
 
-/// What an image bind point holds.
+/// The content of an image slot.
 #[derive(Clone, Debug, Default)]
 pub enum ImageBinding {
-    /// Nothing: zero is read.
+    /// Nothing is bound: zero is read.
     #[default]
     Unbound,
     /// A sampled image.

@@ -1,7 +1,7 @@
 //! Blits: copies that scale, mirror, filter and convert.
 //!
-//! Vulkan 1.3, "Image Copies With Scaling". Where a texel's centre lies in the source is worked out exactly, in
-//! integers, along each axis by itself. Beyond the source's edges its texels at the edge go on.
+//! Vulkan 1.3, "Image Copies With Scaling". The position of a texel's centre in the source is computed exactly, in
+//! integers, separately along each axis. Outside the source, the texels at its edge are read.
 
 #[cfg(test)]
 mod tests;
@@ -43,16 +43,16 @@ pub fn blit_image(blit: &BlitImage) {
     blit.target.memory.bump_generation();
 }
 
-/// What one texel of the target reads along an axis.
+/// The texels that one texel of the target reads along an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Tap {
-    /// Indices in the source; nearest filtering reads the first.
+    /// The indices in the source. Nearest filtering reads only the first.
     index: [u32; 2],
-    /// The second's weight.
+    /// The weight of the second texel.
     weight: f32,
 }
 
-/// The texels of the target along an axis, and what each reads.
+/// The texels of the target along an axis, and the taps of each.
 #[derive(Debug)]
 struct Axis {
     target: Range<u32>,
@@ -60,7 +60,7 @@ struct Axis {
 }
 
 impl Axis {
-    /// Maps the corners `to` of the target to the corners `from` of the source; the sizes are the images'.
+    /// Maps the corners `to` of the target to the corners `from` of the source. The sizes are those of the images.
     fn new(
         filter: Filter,
         from: [i32; 2],
@@ -73,12 +73,12 @@ impl Axis {
         let [from, to] = [from, to].map(|corners| corners.map(i128::from));
         let (source_length, target_length) = (from[1] - from[0], to[1] - to[0]);
         let tap = |i: u32| {
-            // The centre's place in the source is `numerator / denominator` texels from its beginning.
+            // The centre's position in the source is `numerator / denominator` texels from its beginning.
             let mut denominator = 2 * target_length;
             let mut numerator =
                 (2 * (i128::from(i) - to[0]) + 1) * source_length + from[0] * denominator;
             if filter == Filter::Linear {
-                // Texels' centres are half a texel inside.
+                // The centres of texels are half a texel from their edges.
                 numerator -= target_length;
             }
             if denominator < 0 {
@@ -94,12 +94,12 @@ impl Axis {
             };
             Tap { index, weight }
         };
-        // An empty box has no texels, so that nothing is divided by zero.
+        // An empty box has no texels, so that there is no division by zero.
         let taps = host::collect(target.clone().map(tap));
         Self { target, taps }
     }
 
-    /// The texels of the source that are read, as a range.
+    /// The range of texels of the source that are read.
     fn source(&self) -> Range<u32> {
         let indices = || self.taps.iter().flat_map(|tap| tap.index);
         let first = indices().min().unwrap_or(0);
@@ -143,7 +143,7 @@ fn blit_layer(
     for (target_z, tap_z) in z.target.clone().zip(&z.taps) {
         for (target_y, tap_y) in y.target.clone().zip(&y.taps) {
             let row = if same {
-                // Bits that mean nothing are kept, and so are those that mean more than registers hold.
+                // Unused bits are kept, and so is precision that registers do not have.
                 rows.copy(&x, tap_y.index[0], tap_z.index[0], &mut bytes)
             } else {
                 let row = rows.filter(&x, tap_y, tap_z, &mut texels);
@@ -159,18 +159,18 @@ fn blit_layer(
     }
 }
 
-/// Rows of the source, those last read decoded.
+/// Reads rows of the source, and caches those decoded last.
 struct Rows<'a> {
     image: &'a Image,
     layout: SubresourceLayout,
-    /// The columns that are read.
+    /// The range of columns that are read.
     columns: Range<u32>,
     bytes: Vec<u8>,
-    /// Decoded rows and their y and z: as many as one row of the target needs, the last used first.
+    /// The decoded rows with their y and z, the last used first. There are as many as one row of the target needs.
     decoded: Vec<([u32; 2], Vec<[f32; 4]>)>,
 }
 
-/// Two rows of two slices.
+/// The number of cached rows: two rows of two slices.
 const KEPT_ROWS: usize = 4;
 
 impl<'a> Rows<'a> {
@@ -195,7 +195,7 @@ impl<'a> Rows<'a> {
         self.image.read_row(&self.layout, at, &mut self.bytes)
     }
 
-    /// The bytes of a row's nearest texels.
+    /// Copies the bytes of a row's nearest texels to `out`.
     fn copy(&mut self, x: &Axis, y: u32, z: u32, out: &mut [u8]) -> Option<()> {
         self.read(y, z)?;
         let size = self.format().texel_size();
@@ -206,7 +206,7 @@ impl<'a> Rows<'a> {
         Some(())
     }
 
-    /// Decodes a row, unless it is there.
+    /// Decodes a row, unless it is cached.
     fn decode(&mut self, place: [u32; 2]) -> Option<&[[f32; 4]]> {
         let known = self.decoded.iter().position(|(known, _)| *known == place);
         let (_, row) = match known {
@@ -226,9 +226,9 @@ impl<'a> Rows<'a> {
         self.decoded.first().map(|(_, row)| row.as_slice())
     }
 
-    /// The weighted means of a row of the target.
+    /// Computes a row of the target by linear filtering.
     fn filter(&mut self, x: &Axis, y: &Tap, z: &Tap, out: &mut [[f32; 4]]) -> Option<()> {
-        // What has no weight is not read: it might be infinite.
+        // A texel of weight zero is not read, because it might be infinite.
         let taps = |tap: &Tap| {
             let second = (tap.weight > 0.0).then_some((tap.index[1], tap.weight));
             [Some((tap.index[0], 1.0 - tap.weight)), second]
@@ -248,7 +248,7 @@ impl<'a> Rows<'a> {
                         a
                     };
                     if is_first && weight == 1.0 {
-                        // Integers go through untouched.
+                        // Integers must stay unchanged.
                         *out = texel;
                     } else {
                         for (out, component) in out.iter_mut().zip(texel) {

@@ -1,4 +1,4 @@
-//! Copies between images of texels of the same size.
+//! Copies between images whose texels have the same size.
 
 use crate::image::{Image, ImageKind, SubresourceLayout};
 use crate::packet::{CopyImage, ImageCopyRegion, SubresourceLayers};
@@ -14,14 +14,14 @@ pub fn copy_image(copy: &CopyImage) {
     copy.target.memory.bump_generation();
 }
 
-/// The part of a slice or layer that a region names and both images have.
+/// The part of a slice or layer of a region that both images have.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SlicePair {
-    /// Where texels come from: a subresource and the first texel in it.
+    /// The source's subresource, and the first texel in it.
     pub source: (SubresourceLayout, [u32; 3]),
-    /// Where they go.
+    /// The target's subresource, and the first texel in it.
     pub target: (SubresourceLayout, [u32; 3]),
-    /// Texels in x and y.
+    /// The number of texels in x and y.
     pub extent: [u32; 2],
 }
 
@@ -33,7 +33,7 @@ struct Side<'a> {
 }
 
 impl Side<'_> {
-    /// The subresource and z of slice number `index`: 3D images have slices, the others layers.
+    /// The subresource and z of slice number `index`. A 3D image has slices, other images have layers.
     fn slice(&self, index: u32) -> Option<(SubresourceLayout, u32)> {
         let z = i64::from(self.offset[2]);
         let (layer, z) = match self.image.desc.kind {
@@ -47,7 +47,7 @@ impl Side<'_> {
         Some((layout, z))
     }
 
-    /// How many slices or layers there are at most.
+    /// An upper bound of the number of slices or layers.
     fn slices(&self) -> u32 {
         self.image.desc.array_layers.max(self.image.desc.extent[2])
     }
@@ -71,7 +71,7 @@ pub(super) fn for_each_slice(
         offset: region.target_offset,
     };
     let slices = region.extent[2].max(region.source.layer_count);
-    // Offsets before the first slice are at most this many slices outside.
+    // Offsets before the first slice are outside by at most this number of slices.
     for index in 0..slices.min(source.slices().max(target.slices())) {
         if let (Some(from), Some(to)) = (source.slice(index), target.slice(index)) {
             f(&overlap(region, from, to));
@@ -79,7 +79,7 @@ pub(super) fn for_each_slice(
     }
 }
 
-/// What a region is in x and y, clipped to the source, then what is left to the target.
+/// The region in x and y, clipped to the source, and the rest of it clipped to the target.
 fn overlap(
     region: &ImageCopyRegion,
     (source, source_z): (SubresourceLayout, u32),
@@ -106,7 +106,7 @@ fn overlap(
     }
 }
 
-/// `at`, `row` rows below.
+/// The position `row` rows below `at`.
 pub(super) fn below([x, y, z]: [u32; 3], row: u32) -> [u32; 3] {
     [x, y + row, z]
 }

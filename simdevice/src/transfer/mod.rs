@@ -1,8 +1,8 @@
 //! Copies, blits, resolves, fills and clears outside of render passes.
 //!
-//! Regions are expected to be valid; what reaches outside a buffer is left out row by row, what reaches outside an
-//! image is clipped, so that no packet can harm anything but its own result. Every function marks the memory that
-//! it writes as changed.
+//! Regions are expected to be valid. Rows that extend outside a buffer are left out, and regions that extend outside an
+//! image are clipped, so that no packet can harm anything but its own result. Every function marks the memory that it
+//! writes as changed.
 
 mod blit;
 mod image_copy;
@@ -22,7 +22,7 @@ use rayon::prelude::*;
 pub use resolve::resolve_image;
 use std::sync::Arc;
 
-/// The offset into the memory of bytes `offset..offset + size` of a range, if the range has them.
+/// The offset in the memory of bytes `offset..offset + size` of a range, if they lie in the range.
 fn within(range: &BufferRange, offset: u64, size: u64) -> Option<u64> {
     let end = offset.checked_add(size)?;
     (end <= range.size)
@@ -72,7 +72,7 @@ pub fn update_buffer(target: &BufferRange, data: &[u8]) {
     target.memory.bump_generation();
 }
 
-/// Which way a copy between a buffer and an image goes.
+/// The direction of a copy between a buffer and an image.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Direction {
     /// [`Packet::CopyBufferToImage`](crate::Packet::CopyBufferToImage).
@@ -81,7 +81,7 @@ pub enum Direction {
     ToBuffer,
 }
 
-/// From this many bytes on workers share a copy.
+/// The least number of bytes for which workers share a copy.
 const LEAST_SHARED: u64 = 1 << 20;
 
 /// Executes a copy between a buffer and an image.
@@ -126,7 +126,7 @@ fn copy_layer(
         )
     });
     let size = u64::from(x.count) * texel_size;
-    // Texels, in rows, in slices, from the region's beginning in the buffer; `None` if that overflows.
+    // The offset in the memory of a row of a slice of the region; `None` if it overflows or lies outside the buffer.
     let buffer_offset = |row: u32, slice: u32| {
         let slice = u64::from(index)
             .checked_mul(depth.into())?
@@ -141,7 +141,7 @@ fn copy_layer(
         within(&copy.buffer, offset, size)
     };
     let (image, buffer) = (&copy.image, &copy.buffer.memory);
-    // Whether there was room for it.
+    // Returns true if the row was copied.
     let copy_row = |number: usize| {
         let rows = y.count as usize;
         let (slice, row) = ((number / rows) as u32, (number % rows) as u32);
@@ -155,7 +155,7 @@ fn copy_layer(
         matches!(copied, Some(Ok(())))
     };
     let rows = y.count as usize * z.count as usize;
-    // Rows that overlap in the buffer, or an image that does, keep their order.
+    // If rows overlap, or the buffer overlaps the image, the order of rows matters.
     let are_apart = row_length >= width.into()
         && image_height >= height.into()
         && !Arc::ptr_eq(&image.memory, buffer);

@@ -1,13 +1,13 @@
-//! Regions, clipped to images.
+//! The clipping of regions to images.
 
 /// The part of a region that lies in an image, along one axis.
 #[derive(Clone, Copy)]
 pub(super) struct Clipped {
-    /// Texels of the region before it.
+    /// The number of texels of the region before the image.
     pub skipped: u32,
-    /// Its first texel in the image.
+    /// The first texel in the image.
     pub first: u32,
-    /// Its texels.
+    /// The number of texels in the image.
     pub count: u32,
 }
 
@@ -16,7 +16,7 @@ pub(super) fn clip(offset: i32, extent: u32, size: u32) -> Clipped {
     let offset = i64::from(offset);
     let first = offset.max(0);
     let end = (offset + i64::from(extent)).min(size.into());
-    // Both lie in 0..=u32::MAX where the count is positive.
+    // Both values are in 0..=u32::MAX if the count is positive.
     Clipped {
         skipped: (first - offset) as u32,
         first: first as u32,

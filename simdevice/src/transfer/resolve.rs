@@ -1,4 +1,4 @@
-//! Resolves: many samples of a texel become one.
+//! Resolves: copies that combine the samples of a texel.
 
 #[cfg(test)]
 mod tests;

@@ -48,7 +48,7 @@ fn color(base_layer: u32, layer_count: u32) -> SubresourceLayers {
     }
 }
 
-/// All texels of one byte, of all layers and slices.
+/// The texels of an image with one byte per texel, of all layers and slices.
 fn texels(image: &Arc<Image>) -> Vec<u8> {
     let [width, height, depth] = image.desc.extent;
     let layers = image.desc.array_layers;
@@ -324,7 +324,7 @@ fn runtime(threads: usize) -> Runtime {
 fn workers_copy_what_one_thread_does() {
     const SIZE: [u32; 2] = [700, 500];
     let image = image(ImageKind::D2, Format::R32Uint, [SIZE[0], SIZE[1], 1], 1);
-    // Rows that are apart, that follow one another, and that overlap, of which the last one counts.
+    // Rows with gaps, contiguous rows, and overlapping rows, of which the last one counts.
     for row_length in [SIZE[0] + 9, 0, SIZE[0] - 300] {
         let stride = if row_length == 0 { SIZE[0] } else { row_length };
         let texels = stride * SIZE[1] + SIZE[0];

@@ -1,5 +1,5 @@
-//! How far from their means' places Gaussians reach in a picture, by what they are and how they are projected: what the
-//! sides of a frustum are moved out by.
+//! The extent of Gaussians in a picture, measured from the projections of their means. The sides of a frustum are moved
+//! outwards by it.
 
 use crate::gaussian::camera::ViewConstants;
 use crate::gaussian::splat::{LEAST_HALF_FACTOR, binary16_headroom};
@@ -23,22 +23,22 @@ pub(super) fn length(v: [f64; 3]) -> f64 {
     dot(v, v).sqrt()
 }
 
-/// How much wider than exact bounds are, so that rounding loses nothing.
+/// The relative margin by which bounds are wider than exact ones, to allow for rounding.
 const MARGIN: f64 = 1e-5;
 
-/// Gaussians that are rasterized in binary16 and whose deviation, in pixels, exceeds this have no bounds: with it grows
-/// how far binary16 may err.
+/// The greatest standard deviation, in pixels, of a Gaussian that is rasterized in binary16 and has bounds. The error
+/// of binary16 grows with the deviation.
 const GREATEST_HALF_DEVIATION: f64 = 64.0;
 
 /// The distance of an unscented transform's points from the mean, in standard deviations.
 const POINT_DISTANCE: f64 = 1.732_050_807_568_877_3;
 
-/// How much of what keeps a mean off the picture an unscented transform may take away: Gaussians for which it could be
-/// more are not small.
+/// The largest part of a mean's distance from the picture that the points of an unscented transform may bridge.
+/// Gaussians for which it could be more do not count as small.
 const UNSCENTED_SHARE: f64 = 0.25;
 
-/// A Gaussian whose deviation in the picture is `d` pixels reaches no farther than `pixels + per_deviation d` from the place
-/// of its mean, if `d` is at most `greatest`.
+/// The extent in pixels of a Gaussian whose standard deviation in the picture is `d` pixels: at most
+/// `pixels + per_deviation d`, measured from the projection of its mean, if `d` is at most `greatest`.
 #[derive(Clone, Copy, Debug)]
 struct ScreenExtent {
     pixels: f64,
@@ -46,8 +46,9 @@ struct ScreenExtent {
     greatest: f64,
 }
 
-/// The sides of a camera's frustum, for Gaussians whose opacities are at most `opacity`, and the plane that says for which of
-/// them they hold.
+/// The sides of a camera's frustum for Gaussians whose opacities are at most `opacity`, and the plane outside of which
+/// Gaussians are small enough for the sides to hold. No sides if nothing bounds the picture; no plane if the sides hold
+/// for all Gaussians.
 pub(super) fn sides(projection: &ViewConstants, opacity: f32) -> (Vec<Plane>, Option<Plane>) {
     let room = f64::from(opacity.max(1.0)).log2() - projection.log2_floor;
     let is_half = projection.precision == GaussianPrecision::Float16;
@@ -81,27 +82,27 @@ pub(super) fn sides(projection: &ViewConstants, opacity: f32) -> (Vec<Plane>, Op
 
 impl ScreenExtent {
     fn exact(room: f64, low_pass: f64) -> Self {
-        // Wider than the ellipse that the tile engine's margins ask for.
+        // Wider than the ellipse with the tile engine's margins.
         let sigmas = (2.0 * LN_2 * (1.01 * room + 2e-3)).sqrt();
         Self {
-            // The low-pass variance and the scale add in quadrature: their deviations' sum is no less.
+            // The low-pass variance and the scale's variance add up, and the sum of their deviations is no less.
             pixels: sigmas * low_pass.sqrt(),
             per_deviation: sigmas,
             greatest: f64::INFINITY,
         }
     }
 
-    /// In binary16; `None` if nothing bounds it.
+    /// The extent in binary16; `None` if it has no bound.
     fn in_half(room: f64, low_pass: f64) -> Option<Self> {
         let filter = low_pass.sqrt();
         let greatest = GREATEST_HALF_DEVIATION;
-        // Factors are no less than the deviations of what they belong to are great.
+        // The factor of a Gaussian decreases with its deviation, so the greatest deviation has the least factor.
         let least_factor = (0.5 / LN_2 / (greatest * greatest + low_pass)).sqrt();
         if !(filter > 0.0 && least_factor > 1.01 * LEAST_HALF_FACTOR) {
             return None;
         }
-        // The ratio of the factors of the binary16 form is at most the ratio of deviation and filter, so that the reach is a
-        // convex function of the deviation: the chord is above it.
+        // The ratio of the factors of the binary16 form is at most the ratio of deviation and filter, so that the
+        // extent is a convex function of the deviation, and a chord is above it.
         let reach_of = |deviation: f64| {
             let room = binary16_headroom([1.0, deviation / filter, 1.0], room);
             (2.0 * LN_2 * (1.01 * room + 2e-3)).sqrt() * (deviation + filter)
@@ -115,21 +116,22 @@ impl ScreenExtent {
     }
 }
 
-/// A side of a picture.
+/// A side of the frustum.
 struct Side {
-    /// How far, in pixels, the picture's edge is from the principal point, moved out by what all Gaussians reach.
+    /// The distance in pixels from the principal point to the picture's edge, plus the part of the extent that all
+    /// Gaussians have.
     edge: f64,
-    /// Without their extent, Gaussians at `d` from the eye are outside where `normal . d + offset < 0`: pixels, or for a
-    /// pinhole pixels times the depth.
+    /// Without the rest of their extent, Gaussians at `d` from the eye are outside where `normal . d + offset < 0`. The
+    /// unit is pixels, or for a pinhole pixels times the depth.
     normal: [f64; 3],
     offset: f64,
-    /// The deviation in the picture for each unit of scale, at most, in the same units.
+    /// The greatest deviation in the picture per unit of scale, in the same unit.
     deviation: f64,
     focal: f64,
 }
 
 impl Side {
-    /// The side along `axis` that `sign` (1: the lower coordinates) names.
+    /// The side along `axis` at the lower (`sign` 1) or the higher coordinates (`sign` -1).
     fn new(projection: &ViewConstants, axis: usize, sign: f64, reach: &ScreenExtent) -> Self {
         let (across, forward) = (row(projection, axis), row(projection, 2));
         let focal = projection.focal[axis];
@@ -140,13 +142,13 @@ impl Side {
         let steepness = |slope: f64| length(add(across, 1.0, forward, -slope));
         let (normal, offset, deviation) = match (projection.model, projection.geometry) {
             (CameraModel::Orthographic, _) => (normal(0.0), edge, focal.abs() * length(across)),
-            // sign (f x/z + c - edge) + reach, times z, which is positive where it matters.
+            // sign (f x/z + c - edge) + extent, times z, which is positive in front of the eye.
             (_, GaussianGeometry::Volume) => {
                 let ends = [projection.slope_min[axis], projection.slope_max[axis]];
                 let steepest = steepness(ends[0]).max(steepness(ends[1]));
                 (normal(edge), 0.0, focal.abs() * steepest)
             }
-            // A disc is nowhere in the picture if a plane through the eye is between it and the rays.
+            // A disc is not in the picture if a plane through the eye separates it from the rays.
             (_, GaussianGeometry::Surfel) => (normal(edge), 0.0, length(normal(from_edge))),
         };
         Self {
@@ -158,7 +160,7 @@ impl Side {
         }
     }
 
-    /// The plane for what is linearized, and for discs.
+    /// The plane for Gaussians that are linearized, and for discs.
     fn plane(&self, reach: &ScreenExtent) -> Plane {
         Plane {
             normal: self.normal,
@@ -167,12 +169,14 @@ impl Side {
         }
     }
 
-    /// The plane for a pinhole's unscented transform, if it is no farther off than [`Points::nearness`] asks for.
+    /// The plane for a pinhole's unscented transform, for Gaussians that are as small as [`Points::nearness`] demands.
     ///
-    /// Let A be `normal . d` for a mean at depth z and slope u, which is negative, and c the edge. No point appears farther than
-    /// D from the mean, with `f D z <= f r (1 + |u|) / (1 - Q)`, r the points' distance and `r <= Q z`. Neither does the
-    /// transform's mean, and of its variance the middle point makes `2 D^2` at most and the others one more. All that reaches
-    /// `share = Q reach` of `f |u| z <= |A| + |c| z` toward the edge, and `f r reach` besides.
+    /// Let A be `normal . d` for a mean at depth z and slope u, and c the edge; A is negative if the mean is beyond the
+    /// edge. Let r be the points' distance from the mean, with `r <= Q z`. No point appears farther than D from the
+    /// mean in the picture, with `D z <= f r (1 + |u|) / (1 - Q)`. The transform's mean is at most D away, too. To its
+    /// variance the middle point contributes at most `2 D^2` and the other points at most `D^2`. The Gaussian's
+    /// extent times z is at most `reach (f r + Q f |u| z)`. Since `f |u| z <= |A| + |c| z`, that is at most
+    /// `f r reach + share (|A| + |c| z)` with `share = Q reach`. The Gaussian is outside if that is less than `|A|`.
     fn unscented(&self, projection: &ViewConstants, reach: &ScreenExtent) -> Plane {
         let points = Points::new(projection, reach);
         let straight = self.plane(reach);
@@ -185,20 +189,20 @@ impl Side {
                 row(projection, 2),
                 depth,
             ),
-            // Where not all points are seen, it is the Jacobian after all.
+            // Where the projection of some points is undefined, the Jacobian is used.
             per_scale: straight.per_scale.max(of_points),
             offset: 0.0,
         }
     }
 }
 
-/// What an unscented transform's points bound.
+/// Bounds from the points of an unscented transform.
 struct Points {
-    /// Their distance from the mean in camera space for each unit of scale, at most.
+    /// The greatest distance of the points from the mean in camera space, per unit of scale.
     per_scale: f64,
-    /// How far a Gaussian reaches for each unit of the distance at which its points appear from its mean.
+    /// The extent of a Gaussian per unit of the distance at which its points appear from its mean.
     reach: f64,
-    /// Gaussians are small if their points' distance is at most this times the mean's depth.
+    /// The greatest ratio of the points' distance and the mean's depth for which a Gaussian is small.
     nearness: f64,
 }
 
@@ -214,7 +218,7 @@ impl Points {
         }
     }
 
-    /// Outside of this plane Gaussians are small.
+    /// The plane outside of which Gaussians are small.
     fn small(&self, projection: &ViewConstants) -> Plane {
         Plane {
             normal: row(projection, 2).map(|forward| -self.nearness * forward),
@@ -224,8 +228,8 @@ impl Points {
     }
 }
 
-/// Outside of this plane Gaussians whose deviations are at most `deviation` for each unit of scale have those that `reach`
-/// asks for.
+/// The plane outside of which a Gaussian's deviation in the picture is at most `reach.greatest`. Deviations are at most
+/// `deviation` per unit of scale.
 fn small_deviations(projection: &ViewConstants, deviation: f64, reach: &ScreenExtent) -> Plane {
     let (normal, offset) = match projection.model {
         CameraModel::Orthographic => ([0.0; 3], -reach.greatest),

@@ -1,4 +1,4 @@
-//! What is found to be outside is drawn nowhere, in any mode.
+//! Tests that Gaussians outside of the frustum are drawn nowhere, in any mode.
 
 use super::*;
 use crate::format::Format;
@@ -24,7 +24,7 @@ use rand_chacha::ChaCha8Rng;
 
 const SIZE: f32 = 400.0;
 
-/// A draw whose colours alone come from memory.
+/// A draw of which only the colours are read from memory.
 fn append() -> GaussianAppend {
     let memory = Allocation::new(64, false).unwrap();
     let stream = || AttributeStream {
@@ -56,7 +56,7 @@ fn append() -> GaussianAppend {
     }
 }
 
-/// Gaussians all around the edges of what a camera at the origin sees, of all sizes.
+/// Gaussians of all sizes around the edges of the view of a camera at the origin.
 fn around_edges(rng: &mut ChaCha8Rng, is_flat: bool) -> Attributes {
     let mut attributes = Attributes::default();
     for lane in 0..GROUP {
@@ -80,10 +80,10 @@ fn around_edges(rng: &mut ChaCha8Rng, is_flat: bool) -> Attributes {
     attributes
 }
 
-/// The corner of a tile that no picture has.
+/// The corner of a tile that lies outside of every picture.
 const FAR_OFF: [u32; 2] = [1 << 24; 2];
 
-/// A lane as a cluster of one.
+/// The bounds of a cluster of one lane.
 fn bounds(attributes: &Attributes, lane: usize) -> Bounds {
     let at = |of: &[f32; F32_LANES]| of[lane];
     let position = attributes.position.each_ref().map(at);
@@ -145,7 +145,7 @@ fn what_is_outside_is_drawn_nowhere() {
                     rotation: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
                     eye: [0.0; 3],
                     focal_length: [rng.random_range(100.0..900.0), 300.0],
-                    // Far from the middle, too.
+                    // It may lie far from the middle.
                     principal_point: [rng.random_range(-400.0..800.0), 200.0],
                     near_plane: 0.2,
                     far_plane: 50.0,
@@ -195,7 +195,7 @@ fn what_is_outside_is_drawn_nowhere() {
                 beside += outside.beside.count();
                 let mut is_drawn = [false; GROUP];
                 for (at, &[_, lane]) in out.keys.iter().enumerate() {
-                    // Discs that reach the eye's plane are listed everywhere, wherever they are.
+                    // Discs that reach the eye's plane are listed in all tiles, wherever they are.
                     let everywhere = |surfel: &Surfel| surfel.blocks(FAR_OFF) != 0;
                     is_drawn[lane as usize] = !out.surfels.get(at).is_some_and(everywhere);
                 }

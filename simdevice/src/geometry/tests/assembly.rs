@@ -1,4 +1,4 @@
-//! Every topology against the tables of Vulkan 1.3, written out vertex by vertex.
+//! Tests of every topology against the tables of Vulkan 1.3, written out vertex by vertex.
 
 use super::scene::*;
 use crate::packet::IndexStream;
@@ -20,7 +20,7 @@ const TOPOLOGIES: [Topology; 10] = [
     TriangleStripWithAdjacency,
 ];
 
-/// The primitives of a run: vertices, then the provoking vertex of first and of last mode.
+/// The primitives of a run: their vertices, and the provoking vertices of first-vertex and last-vertex mode.
 fn naive(topology: Topology, run: &[u32]) -> Vec<(Vec<u32>, [u32; 2])> {
     let mut out = Vec::new();
     let n = run.len();
@@ -39,7 +39,7 @@ fn naive(topology: Topology, run: &[u32]) -> Vec<(Vec<u32>, [u32; 2])> {
             TriangleStrip if i % 2 == 0 => add(&[i, i + 1, i + 2], i, i + 2),
             TriangleStrip => add(&[i, i + 2, i + 1], i, i + 2),
             TriangleFan => add(&[i + 1, i + 2, 0], i + 1, i + 2),
-            // The adjacent vertices must be there, too.
+            // The adjacent vertices must exist, too.
             LineListWithAdjacency if i % 4 == 0 && i + 3 < n => add(&[i + 1, i + 2], i + 1, i + 2),
             LineStripWithAdjacency if i + 3 < n => add(&[i + 1, i + 2], i + 1, i + 2),
             TriangleListWithAdjacency if i % 6 == 0 && i + 5 < n => {
@@ -59,7 +59,7 @@ fn naive(topology: Topology, run: &[u32]) -> Vec<(Vec<u32>, [u32; 2])> {
     out
 }
 
-/// Rotates the least vertex to the front, so that only order around the polygon counts.
+/// Rotates the least vertex to the front, so that only the winding order matters.
 fn canonical(mut vertices: Vec<u32>) -> Vec<u32> {
     if vertices.len() == 3 {
         let least = (0..3).min_by_key(|&i| vertices[i]).unwrap();
@@ -68,7 +68,7 @@ fn canonical(mut vertices: Vec<u32>) -> Vec<u32> {
     vertices
 }
 
-/// Positions of which no three are in line, in all of the framebuffer.
+/// Random positions in the framebuffer, of which no three are collinear.
 fn positions(count: usize) -> Vec<[f32; 4]> {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let mut coordinate = || rng.random_range(-0.9..0.9);
@@ -77,7 +77,7 @@ fn positions(count: usize) -> Vec<[f32; 4]> {
         .collect()
 }
 
-/// The primitives of a draw by id, instance, vertices in winding order, and provoking vertex.
+/// The primitives of a draw: id, instance, vertices in winding order, and provoking vertex.
 fn primitives(draw: &Found) -> Vec<(u32, u32, Vec<u32>, u32)> {
     let index = |vertex| varying_bits(draw, vertex, INDEX);
     let describe = |primitive: &super::super::Primitive| {
@@ -85,7 +85,7 @@ fn primitives(draw: &Found) -> Vec<(u32, u32, Vec<u32>, u32)> {
         let vertices = match primitive.kind {
             super::super::PrimitiveKind::Point => vec![a],
             super::super::PrimitiveKind::Line => vec![a, c],
-            // The state has clockwise front faces, whose corners keep their order.
+            // Front faces are clockwise in this state, and their corners keep their order.
             super::super::PrimitiveKind::Triangle if primitive.front => vec![a, b, c],
             super::super::PrimitiveKind::Triangle => vec![a, c, b],
         };
@@ -100,8 +100,8 @@ fn primitives(draw: &Found) -> Vec<(u32, u32, Vec<u32>, u32)> {
     draw.primitives.iter().map(describe).collect()
 }
 
-/// What a draw of these runs, for each of two instances from number 5 on, must become. The ids and vertices of
-/// primitives that have two equal vertices don't occur.
+/// The expected primitives of a draw of these runs, for each of two instances from number 5 on. Primitives with two
+/// equal vertices are left out.
 fn expected(topology: Topology, runs: &[Vec<u32>], last: bool) -> Vec<(u32, u32, Vec<u32>, u32)> {
     let mut out = Vec::new();
     for instance in [5, 6] {
@@ -154,7 +154,7 @@ fn indices_and_restarts_make_the_primitives_of_the_specification() {
                 let mut state = state(topology);
                 state.primitive_restart = restarts;
                 draw.state = state.into();
-                // Small numbers make vertices repeat; the offset makes them others.
+                // Small numbers repeat vertices; the offset must be added to them.
                 let mut list: Vec<u32> = (0..90).map(|_| rng.random_range(0..90)).collect();
                 if restarts {
                     list.iter_mut().for_each(|index| {
@@ -196,7 +196,7 @@ fn draws_of_many_chunks_are_like_one() {
     let positions = positions(5000);
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     for topology in [TriangleList, TriangleStrip, TriangleFan, LineStrip] {
-        // Far apart and close together: both ways to find distinct vertices.
+        // Indices far apart and close together use the two ways to find distinct vertices.
         for spread in [5000, 40] {
             let mut at = 0;
             let list: Vec<u32> = (0..9000)
@@ -211,7 +211,7 @@ fn draws_of_many_chunks_are_like_one() {
             (draw.first_instance, draw.instance_count) = (5, 2);
             let found = primitives(&run(&device, &draw));
             let expected = expected(topology, std::slice::from_ref(&list), false);
-            // Some are too small to cover anything; what is left must be in order.
+            // Some primitives are too small to cover anything. The others must be in order.
             let mut rest = expected.iter();
             for primitive in &found {
                 assert!(

@@ -1,4 +1,4 @@
-//! Bins against a look at every pixel of every macro-tile.
+//! Tests of bins against a search of every pixel of every macro-tile.
 
 use super::super::{FrontEnd, Primitive, PrimitiveKind, Surface};
 use super::scene::*;
@@ -10,7 +10,7 @@ use crate::stats::counters::Counters;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Whether a primitive covers a pixel's centre.
+/// True if a primitive covers a pixel's centre.
 fn covers(primitive: &Primitive, [x, y]: [i64; 2]) -> bool {
     let at = [256 * x + 128, 256 * y + 128];
     let [a, b, c] = primitive.corners.map(|corner| corner.map(i64::from));

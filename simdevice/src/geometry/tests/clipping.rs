@@ -1,4 +1,4 @@
-//! Clipping against an oracle that does not clip: a pixel's ray is intersected with the triangle in clip space.
+//! Tests of clipping against an oracle that does not clip: it intersects a pixel's ray with the triangle in clip space.
 
 use super::scene::*;
 use crate::program::interface::VertexOutput;
@@ -6,7 +6,7 @@ use crate::state::Topology;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// For a point in pixels, the amounts of a triangle's corners that make it with w = 1; any may be negative.
+/// The weights of a triangle's corners whose sum is a point in pixels with w = 1. Any may be negative.
 fn amounts(triangle: &[[f32; 4]], at: [f64; 2]) -> Option<[f64; 3]> {
     let column = |corner: usize| {
         let [x, y, _, w] = triangle[corner].map(f64::from);
@@ -31,7 +31,7 @@ fn amounts(triangle: &[[f32; 4]], at: [f64; 2]) -> Option<[f64; 3]> {
     (determinant.abs() > 1e-9).then(|| [amount(b, c), amount(c, a), amount(a, b)])
 }
 
-/// Whether a triangle, its depth and its clip distances are visible at a point in pixels.
+/// True if a triangle is visible at a point in pixels, given its depth and its clip distances.
 fn visible(triangle: &[[f32; 4]], distances: &[[f32; 4]], clip_depth: bool, at: [f64; 2]) -> bool {
     let Some(amounts) = amounts(triangle, at) else {
         return false;
@@ -49,7 +49,7 @@ fn visible(triangle: &[[f32; 4]], distances: &[[f32; 4]], clip_depth: bool, at: 
         && (0..2).all(|index| sum([0, 1, 2].map(|corner: usize| distances[corner][index])) >= 0.0)
 }
 
-/// How many primitives cover a pixel's centre.
+/// The number of primitives that cover a pixel's centre.
 fn coverage(draw: &Found, id: Option<u32>, pixel: [i64; 2]) -> usize {
     let at = pixel.map(|pixel| 256 * pixel + 128);
     let covers = |corners: [[i32; 2]; 3]| {
@@ -109,7 +109,7 @@ fn what_is_left_is_what_is_visible() {
                     rng.random_range(0..i64::from(WIDTH)),
                     rng.random_range(0..i64::from(HEIGHT)),
                 ];
-                // Within a 64th of a pixel of an edge, snapping may decide either way.
+                // Within 1/64 pixel of an edge, snapping may decide either way.
                 let around = [
                     [0.0, 0.0],
                     [1.0, 1.0],
@@ -138,7 +138,7 @@ fn what_is_left_is_what_is_visible() {
         }
         cut += found.primitives.len();
     }
-    // Otherwise the test would see nothing.
+    // Otherwise the test would check too little.
     assert!(inside > 5_000 && checked > 100_000, "{inside} of {checked}");
     assert!(cut > 200, "{cut}");
 }
@@ -149,7 +149,7 @@ fn meshes_stay_watertight_where_they_are_clipped() {
     let device = device(1);
     let mut rng = ChaCha8Rng::seed_from_u64(33);
     for _ in 0..6 {
-        // A plane that reaches from behind the eye to beyond the far plane, turned at random.
+        // A plane that extends from behind the eye to beyond the far plane, rotated at random.
         let turn: f32 = rng.random_range(0.0..6.3);
         let (sin, cos) = turn.sin_cos();
         let height = rng.random_range(0.2..1.0);
@@ -171,7 +171,7 @@ fn meshes_stay_watertight_where_they_are_clipped() {
             for column in 0..SIDE {
                 let a = (row * (SIDE + 1) + column) as u32;
                 let (b, c, d) = (a + 1, a + 1 + SIDE as u32, a + 2 + SIDE as u32);
-                // Edges are run through in either direction, from either end.
+                // Edges occur in both directions, and begin at either end.
                 list.extend([a, b, c, d, c, b]);
             }
         }
@@ -190,7 +190,7 @@ fn meshes_stay_watertight_where_they_are_clipped() {
                 assert!(count <= 1, "{x} {y}");
                 covered += count;
                 if count == 0 {
-                    // Nothing may be missing that is surrounded by the mesh.
+                    // A pixel that the mesh surrounds must be covered.
                     let at = [x as f64 + 0.5, y as f64 + 0.5];
                     let seen = |[dx, dy]: [f64; 2]| {
                         let at = [at[0] + dx, at[1] + dy];
@@ -252,7 +252,7 @@ fn new_vertices_have_the_varyings_of_their_place() {
                         value
                     };
                     let off = (x * 256.0 - primitive.corners[corner][0] as f32).abs();
-                    // Half a unit from snapping; binary32 has no more than 24 bits for far away ones.
+                    // Snapping moves it by half a unit, and binary32 has only 24 bits for distant ones.
                     assert!(
                         off < 1.0 + x.abs() / 1000.0,
                         "{x} {:?}",

@@ -1,4 +1,4 @@
-//! Facing, culling, and what is dropped because it covers nothing.
+//! Tests of facing and culling, and of dropping primitives that cover nothing.
 
 use super::scene::*;
 use crate::program::interface::VertexOutput;
@@ -10,7 +10,7 @@ use rand_chacha::ChaCha8Rng;
 #[test]
 fn facing_is_the_sign_of_the_area_in_the_framebuffer() {
     let device = device(1);
-    // Clockwise on a screen whose y points down.
+    // Clockwise in a framebuffer whose y points down.
     let clockwise = [
         at_pixel(10.0, 10.0, 0.0),
         at_pixel(90.0, 10.0, 0.0),
@@ -46,7 +46,7 @@ fn facing_is_the_sign_of_the_area_in_the_framebuffer() {
     }
 }
 
-/// Whether any pixel centre of the framebuffer lies in a triangle, by the top-left rule.
+/// True if any pixel centre of the framebuffer lies in a triangle, by the top-left rule.
 fn covers(corners: [[i32; 2]; 3]) -> bool {
     let [a, b, c] = corners.map(|corner| corner.map(i64::from));
     let edge = |from: [i64; 2], to: [i64; 2], at: [i64; 2]| {
@@ -68,7 +68,7 @@ fn only_what_covers_nothing_is_dropped() {
     let mut rng = ChaCha8Rng::seed_from_u64(11);
     let mut positions = Vec::new();
     for number in 0..800 {
-        // Every other one spans at most two pixels.
+        // Every second triangle spans at most two pixels.
         let reach = if number % 2 == 0 { 0.9 } else { 2.5 };
         // Many lie on pixel centres and edges.
         let grid = [0.5, 0.25, 1.0 / 256.0][rng.random_range(0..3)];
@@ -100,7 +100,7 @@ fn only_what_covers_nothing_is_dropped() {
             assert!(kept.contains(&id), "{corners:?}");
         }
     }
-    // Small ones are looked at exactly.
+    // Small triangles are tested exactly.
     for primitive in found
         .primitives
         .iter()
@@ -139,7 +139,7 @@ fn a_primitive_goes_to_the_provoking_vertexs_layer_and_viewport() {
     let last = run(&device, &draw);
     let (a, b) = (&first.primitives[0], &last.primitives[0]);
     assert_eq!((a.layer, a.viewport), (2, 1));
-    // What doesn't exist is the last layer and the first viewport.
+    // A layer that does not exist becomes the last one, and a viewport the first.
     assert_eq!((b.layer, b.viewport), (3, 0));
     assert_eq!(a.corners, b.corners.map(|[x, y]| [x + 25_600, y]));
     assert_eq!(first.regions[1].width, 70);
@@ -197,7 +197,7 @@ fn statistics_count_every_stage() {
         at_pixel(90.0, 0.0, 0.5),
         at_pixel(90.0, 90.0, 0.5),
     ];
-    // Cut in two by the near plane, and one beyond it.
+    // One triangle is cut in two by the near plane, and one is beyond it.
     positions.extend([
         at_pixel(0.0, 0.0, 0.5),
         at_pixel(90.0, 0.0, 0.5),

@@ -1,4 +1,4 @@
-//! Vertex fetch against the formats' own decoder, element by element.
+//! Tests of vertex fetch against the formats' own decoder, element by element.
 
 use super::scene::*;
 use crate::format::{Channel, Format};
@@ -8,8 +8,7 @@ use crate::state::Topology;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// A program that draws each vertex as a point in the middle of the screen, with an attribute's components as
-/// varyings.
+/// Programs that draw each vertex as a point in the middle of the screen, with an attribute's components as varyings.
 fn pass_through() -> DrawPrograms {
     let mut inputs: Vec<_> = attribute(0).collect();
     inputs.extend(attribute(1));
@@ -26,7 +25,7 @@ fn pass_through() -> DrawPrograms {
     }
 }
 
-/// What each of `vertices`, in each instance, reads of a stream.
+/// The values that each of `vertices`, in each instance, reads from a stream.
 fn naive(
     stream: &AttributeStream,
     vertices: &[u32],
@@ -77,7 +76,7 @@ fn check(stream: AttributeStream, vertices: &[u32], consecutive: bool) {
     assert_eq!(found.primitives.len(), expected.len());
     for (primitive, expected) in found.primitives.iter().zip(expected) {
         let found = [0, 1, 2, 3].map(|number| varying_bits(&found, primitive.provoking, number));
-        // A NaN's bits may change on the way.
+        // The bits of a NaN may change.
         for (found, expected) in found.into_iter().zip(expected) {
             let both_nan = f32::from_bits(found).is_nan() && f32::from_bits(expected).is_nan();
             assert!(
@@ -88,7 +87,7 @@ fn check(stream: AttributeStream, vertices: &[u32], consecutive: bool) {
     }
 }
 
-/// A stream over a buffer of random bytes that is not as long as its memory.
+/// A stream over a buffer of random bytes that is shorter than its memory.
 fn random_stream(rng: &mut ChaCha8Rng, format: Format, bytes: usize) -> AttributeStream {
     let contents: Vec<u8> = (0..bytes + 64).map(|_| rng.random()).collect();
     let BufferRange { memory, .. } = buffer(&contents);

@@ -1,4 +1,4 @@
-//! Tests of the front end: each against a naive twin or a property that must hold.
+//! Tests of the front end, each against a naive reference or a property that must hold.
 
 mod assembly;
 mod binning;

@@ -1,4 +1,4 @@
-//! Nothing that a draw says may panic, and nothing depends on the number of workers.
+//! Tests that no draw panics, and that the result is independent of the number of workers.
 
 use super::scene::*;
 
@@ -9,7 +9,7 @@ use crate::state::{DepthBias, DrawState, PolygonMode, Topology, Viewport};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Any float, the odd ones often.
+/// A random float that is often a special value.
 fn wild(rng: &mut ChaCha8Rng) -> f32 {
     let odd = [
         0.0,
@@ -136,7 +136,7 @@ fn numbers_at_the_end_of_their_range_are_survived() {
     assert_eq!(drawn(&|draw| indexed(draw, &[0, 1, u32::MAX], i32::MAX)), 0);
     assert_eq!(drawn(&|draw| indexed(draw, &[0, 1, 2], i32::MIN)), 0);
     assert_eq!(drawn(&|draw| indexed(draw, &[1, 2, 3], -1)), 1);
-    // Indices that don't exist are zero.
+    // Indices outside of the buffer are zero.
     assert_eq!(drawn(&|draw| indexed(draw, &[0, 1], 0)), 0);
     assert_eq!(
         drawn(&|draw| {

@@ -1,4 +1,4 @@
-//! Draws that the tests share.
+//! The draws and programs that the tests share.
 
 use super::super::{Bins, FrontEnd, Primitive, PrimitiveDraw, Surface, Varyings};
 use crate::device::Device;
@@ -22,9 +22,9 @@ use isa::builder::Builder;
 use isa::ir::{Program, Rate, Type};
 use std::sync::Arc;
 
-/// The framebuffer: neither side is a multiple of a macro-tile's.
+/// The framebuffer's width. Neither it nor the height is a multiple of a macro-tile's side.
 pub const WIDTH: u32 = 200;
-/// See [`WIDTH`].
+/// The framebuffer's height.
 pub const HEIGHT: u32 = 150;
 
 /// All pixels.
@@ -41,10 +41,10 @@ pub const INDEX: usize = 0;
 pub const INSTANCE: usize = 1;
 /// The varying that holds the second attribute's first component, perspective-correct.
 pub const VALUE: usize = 2;
-/// The same, linear in the framebuffer.
+/// The varying that holds the same component, linear in the framebuffer.
 pub const LINEAR: usize = 3;
 
-/// A device with that many workers.
+/// A device with `threads` workers.
 pub fn device(threads: usize) -> Device {
     let config = Config {
         threads,
@@ -53,7 +53,7 @@ pub fn device(threads: usize) -> Device {
     Device::new(&config).unwrap()
 }
 
-/// A program that copies its inputs, by slot, to outputs.
+/// A program that copies inputs to outputs, each by slot.
 pub fn copies(inputs: u32, copies: &[(u32, u32)]) -> Program {
     let mut b = Builder::new();
     let inputs: Vec<_> = (0..inputs)
@@ -66,7 +66,7 @@ pub fn copies(inputs: u32, copies: &[(u32, u32)]) -> Program {
     b.finish().unwrap()
 }
 
-/// The four components of an attribute.
+/// The four components of an attribute, as inputs.
 pub fn attribute(stream: usize) -> impl Iterator<Item = Option<VertexInput>> {
     (0..4).map(move |component| Some(VertexInput::Attribute { stream, component }))
 }
@@ -91,8 +91,8 @@ pub fn fragment(interpolation: &[Interpolation]) -> FragmentPrograms {
     }
 }
 
-/// Positions come from attribute 0, varyings are as the constants above say. `extra` are what outputs take the
-/// components of attribute 2.
+/// The programs of a draw: positions come from attribute 0, and varyings are those of the constants above. The outputs
+/// `extra` take the components of attribute 2.
 pub fn programs(extra: &[VertexOutput]) -> DrawPrograms {
     use Interpolation::*;
     let mut pairs = vec![
@@ -125,7 +125,7 @@ pub fn programs(extra: &[VertexOutput]) -> DrawPrograms {
     }
 }
 
-/// State without any culling.
+/// A state without any culling.
 pub fn state(topology: Topology) -> DrawState {
     DrawState::new(topology, [WIDTH, HEIGHT])
 }
@@ -162,12 +162,12 @@ pub fn indices(elements: &[u32]) -> IndexStream {
     }
 }
 
-/// A draw of all of these positions, as [`programs`] has them.
+/// A draw of these positions with the programs of [`programs`].
 pub fn draw(device: &Device, topology: Topology, positions: &[[f32; 4]]) -> Draw {
     draw_with(device, programs(&[]), state(topology), positions)
 }
 
-/// A draw of all of these positions.
+/// A draw of these positions with other programs and state.
 pub fn draw_with(
     device: &Device,
     programs: DrawPrograms,
@@ -193,7 +193,7 @@ pub fn draw_with(
     }
 }
 
-/// What a draw becomes, with its chunks joined.
+/// The result of a draw, with its segments joined.
 #[derive(Debug, Default)]
 pub struct Found {
     pub primitives: Vec<Primitive>,
@@ -203,7 +203,7 @@ pub struct Found {
 }
 
 impl Found {
-    /// Joins the chunks of a part.
+    /// Joins the segments of a part.
     pub fn new(part: PrimitiveDraw) -> Self {
         let mut found = Self {
             regions: part.regions,
@@ -228,7 +228,7 @@ impl Found {
         found
     }
 
-    /// The primitives that a macro-tile has to look at.
+    /// The primitives in a macro-tile's list.
     pub fn binned(&self, macro_tile: [u32; 2], layer: u32) -> Vec<u32> {
         let lists = self.bins.iter().flat_map(|(before, bins)| {
             let list = bins.primitives_of(macro_tile, layer).iter();
@@ -237,13 +237,13 @@ impl Found {
         lists.collect()
     }
 
-    /// How many pairs of a macro-tile and a primitive there are.
+    /// The number of pairs of a macro-tile and a primitive.
     pub fn pairs(&self) -> u64 {
         self.bins.iter().map(|(_, bins)| bins.pairs()).sum()
     }
 }
 
-/// What a draw becomes, in parts.
+/// The result of a draw, part by part.
 pub fn parts(device: &Device, draw: &Draw) -> (Vec<Found>, Counters) {
     let surface = Surface {
         area: EVERYTHING,
@@ -260,7 +260,7 @@ pub fn parts(device: &Device, draw: &Draw) -> (Vec<Found>, Counters) {
     (parts, counters)
 }
 
-/// What a draw becomes; it must be one part or nothing.
+/// The result of a draw of at most one part.
 pub fn run(device: &Device, draw: &Draw) -> Found {
     let (mut parts, _) = parts(device, draw);
     assert!(parts.len() <= 1);
@@ -283,7 +283,7 @@ pub fn area(corners: [[i32; 2]; 3]) -> i64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }
 
-/// The clip-space position, w 1, of a point given in pixels.
+/// The clip-space position, with w = 1, of a point given in pixels.
 pub fn at_pixel(x: f32, y: f32, z: f32) -> [f32; 4] {
     [
         x / WIDTH as f32 * 2.0 - 1.0,

@@ -1,4 +1,4 @@
-//! Points, lines, polygon modes and depth bias.
+//! Tests of points, lines, polygon modes and depth bias.
 
 use super::super::PrimitiveKind;
 use crate::program::interface::VertexOutput;
@@ -6,7 +6,7 @@ use crate::state::{DepthBias, PolygonMode, Topology};
 
 use super::scene::*;
 
-/// The parallelogram's corners, the fourth included.
+/// The four corners of a parallelogram.
 fn corners(draw: &Found, number: usize) -> Vec<[i32; 2]> {
     let [a, b, c] = draw.primitives[number].corners;
     vec![a, b, c, [a[0] + c[0] - b[0], a[1] + c[1] - b[1]]]
@@ -77,7 +77,7 @@ fn lines_are_rectangles_around_their_segment() {
             let (dx, dy) = (ends[1][0] - ends[0][0], ends[1][1] - ends[0][1]);
             let scale = width / 2.0 / f32::hypot(dx, dy);
             let side = [-dy * scale, dx * scale];
-            // Corners 0 and 1 are at the first end, on either side; 2 and 3 at the other.
+            // Corners 0 and 1 are at the first end, one on either side; corners 2 and 3 at the other.
             let expected = [(0, 1.0), (0, -1.0), (1, -1.0), (1, 1.0)];
             for (corner, (end, sign)) in corners.iter().zip(expected) {
                 for axis in 0..2 {
@@ -105,7 +105,7 @@ fn a_line_without_length_is_not_drawn() {
 #[test]
 fn polygons_may_be_drawn_as_their_edges_or_vertices() {
     let device = device(1);
-    // The near plane cuts off the third vertex, and leaves no edge where it cuts.
+    // The near plane cuts off the third vertex. The cut is not part of the outline.
     let whole = [
         at_pixel(20.0, 20.0, 0.5),
         at_pixel(120.0, 20.0, 0.5),

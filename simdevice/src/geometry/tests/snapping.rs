@@ -1,4 +1,4 @@
-//! The viewport transform and snapping, digit by digit.
+//! Tests of the viewport transform and snapping against exact values.
 
 use super::super::viewport::{Transform, pixels, snap, snap_away};
 use super::scene::*;
@@ -19,7 +19,7 @@ fn coordinates_round_to_the_nearest_sub_pixel() {
         check(rng.random_range(-3.0..3.0));
     }
     for step in -2000..2000 {
-        // Every other one is a tie.
+        // Every second value is a tie.
         check(step as f32 / 512.0);
     }
     for x in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e30, -1e30] {
@@ -113,7 +113,7 @@ fn snapping_does_not_move_the_plane_of_depth() {
         .collect();
     let drawn = run(&device, &draw(&device, Topology::TriangleList, &positions));
     let transform = Transform::new(&state(Topology::TriangleList).viewports[0], false);
-    // The depth at a place, of a plane given at three others.
+    // The depth at a point, of a plane given at three others.
     let plane = |corners: [[f64; 2]; 3], depth: [f64; 3], at: [f64; 2]| {
         let area = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| {
             (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])

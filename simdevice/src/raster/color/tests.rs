@@ -4,7 +4,7 @@ use isa::level::SimdLevel;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Every float around every code, its middle and its neighbours' middle.
+/// Tests every float near every 8-bit code and near the middle between two codes.
 #[test]
 fn bytes_are_the_nearest_and_read_back_as_their_format_says() {
     let mut values = vec![f32::NAN, f32::INFINITY, -1.0, -0.0, 2.0, f32::MIN_POSITIVE];
@@ -43,7 +43,7 @@ fn stores_touch_only_their_lanes() {
         consecutive: false,
     };
     let mut words = [7; 16];
-    // Quads 0 and 2 share a place, each with lanes of its own.
+    // Quads 0 and 2 have the same address, each with different lanes.
     quads.store(&mut words, 0b1111_0110_0000_1001, &values);
     assert_eq!(
         words,
@@ -114,7 +114,7 @@ fn whole_blocks_of_wide_texels_are_what_their_lanes_are() {
             let level = level.resolve().unwrap();
             let source: [[f32; 16]; 4] =
                 std::array::from_fn(|_| std::array::from_fn(|_| rng.random_range(-0.2..1.2)));
-            // A texel before and one behind are not the block's.
+            // One texel before the block and one after it must not change.
             let stored: [u32; 72] = std::array::from_fn(|_| rng.random::<f32>().to_bits());
             let write = |lanes: &[u16], consecutive| {
                 let mut words = stored;

@@ -5,7 +5,7 @@ use isa::level::SimdLevel;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// What a format's encoder makes of a depth.
+/// The encoding of a depth by the format's own encoder.
 fn expected(format: Format, depth: f32) -> u32 {
     let [a, b, c, d, ..] = format.encode([depth, 0.0, 0.0, 0.0]);
     match format {
@@ -22,7 +22,7 @@ fn depths_become_the_nearest_numbers_of_their_format() {
         .map(|round| match round % 4 {
             0 => rng.random_range(0.0..1.0),
             1 => rng.random_range(0.0f32..1.0).powi(9),
-            // Beside the middle of two codes.
+            // Near the middle between two codes.
             2 => ((f64::from(rng.random_range(0..1u32 << 16)) + 0.5) / 65_535.0) as f32,
             _ => ((f64::from(rng.random_range(0..1u32 << 24)) + 0.5) / 16_777_215.0) as f32,
         })

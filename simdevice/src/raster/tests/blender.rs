@@ -1,4 +1,4 @@
-//! Blending of one fragment (Vulkan 1.3, 29.1): the naive twin of [`crate::raster::color`].
+//! Blending of one fragment (Vulkan 1.3, 29.1): the naive reference for [`crate::raster::color`].
 
 use crate::format::Format;
 use crate::raster::color::clamp_range;
@@ -7,10 +7,10 @@ use crate::state::{BlendEquation, BlendFactor, BlendOp, BlendState};
 /// The blending of one attachment, prepared for many fragments.
 #[derive(Clone, Debug)]
 pub struct Blender {
-    /// Of colours and of alpha.
+    /// The equations of colour and of alpha.
     equations: Option<(BlendEquation, BlendEquation)>,
     constants: [f32; 4],
-    /// What sources, destinations and constants are clamped to.
+    /// The range to which sources, destinations and constants are clamped.
     range: Option<(f32, f32)>,
     write: [bool; 4],
 }
@@ -28,12 +28,12 @@ impl Blender {
         }
     }
 
-    /// What `source` makes of `destination`, before it is quantised to the format.
+    /// Blends `source` with `destination`, without quantization to the format.
     pub fn blend(&self, source: [f32; 4], destination: [f32; 4]) -> [f32; 4] {
         self.blend_dual(source, [0.0; 4], destination)
     }
 
-    /// As [`Blender::blend`], with the second source of dual-source blending.
+    /// Blends as [`Blender::blend`] does, with the second source of dual-source blending.
     pub fn blend_dual(
         &self,
         source: [f32; 4],
@@ -67,7 +67,7 @@ fn clamp(color: [f32; 4], range: Option<(f32, f32)>) -> [f32; 4] {
     }
 }
 
-/// The blend equation.
+/// Evaluates a blend equation.
 fn evaluate(
     equation: BlendEquation,
     s: [f32; 4],
@@ -167,7 +167,7 @@ mod tests {
     ];
     const CONSTANTS: [f32; 4] = [0.2, 1.5, -0.25, 0.75];
 
-    /// The blend equation as tables of (factor, RGB, A) in binary64, straight from the specification.
+    /// The factors of a blend equation in binary64, as in the specification's table.
     fn model_factor(
         f: BlendFactor,
         s: [f64; 4],
@@ -223,7 +223,8 @@ mod tests {
         Blender::new(&state, CONSTANTS, format)
     }
 
-    /// Every pair of factors and every operation against the model, clamped to `range` where there is one.
+    /// Compares every pair of factors and every operation with the model. Operands are clamped to `range` if there is
+    /// one.
     fn compare(format: Format, range: Option<(f64, f64)>) {
         let wide = |v: [f32; 4]| {
             v.map(|x| match range {

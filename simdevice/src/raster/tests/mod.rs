@@ -1,3 +1,3 @@
-//! What the tests of both modes share.
+//! Code that the tests of both modes share.
 
 pub(super) mod blender;

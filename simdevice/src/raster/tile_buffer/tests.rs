@@ -86,7 +86,7 @@ fn texels_of_every_size_survive_a_load_and_a_store() {
                 let mut after = vec![0u8; before.len()];
                 memory.read(0, &mut after).unwrap();
                 if target.format() == Format::X8D24UnormPack32 {
-                    // The unused bits may become anything.
+                    // The unused bits may have any value.
                     let layout = view.image.subresource(aspect, 0, 0).unwrap();
                     let end = (layout.offset + layout.size) as usize;
                     (layout.offset as usize + 3..end)
@@ -161,7 +161,7 @@ fn what_cannot_be_rendered_to_is_refused() {
     assert_eq!(target.layer_count(), 3, "slices are layers");
 }
 
-/// The mean of four samples of bytes has a kernel; a format beside it, of the same bytes, has none.
+/// Tests the kernel for the mean of four samples of bytes against the general way.
 #[test]
 fn means_of_bytes_are_those_of_the_format() {
     let format = Format::R8G8B8A8Unorm;

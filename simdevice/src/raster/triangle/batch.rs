@@ -1,5 +1,5 @@
-//! Batches of fragments: 2x2 quads of any primitives of a draw within a macro-tile, and what the fragment program gets
-//! of them.
+//! Batches of fragments: 2x2 quads of any primitives of a draw in a macro-tile, and the inputs of the fragment program
+//! for them.
 
 use super::setup::Needs;
 use super::setup::TriangleSetup;
@@ -14,85 +14,85 @@ use fearless_simd::{Simd, f32x16, prelude::*};
 use isa::Vector;
 use isa::machine::{LaneMask, Machine};
 
-/// Lanes of the largest batch.
+/// The number of lanes of the largest batch.
 pub const LANES: usize = BATCH_LANES[1];
-/// Quads of it.
+/// The number of quads of the largest batch.
 pub const QUADS: usize = LANES / 4;
 
-/// A quad that is to be shaded.
+/// A quad to be shaded.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Quad {
-    /// Its primitive: an index into [`Batch::records`].
+    /// The index in [`Batch::records`] of its primitive's record.
     pub record: u16,
-    /// Its tile of the macro-tile.
+    /// The index in the macro-tile of its tile.
     pub tile: u8,
-    /// Its first pixel's place within the tile.
+    /// The index in the tile of its first pixel.
     pub place: u8,
-    /// Bit `4 sample + lane` tells which samples are covered.
+    /// The covered samples: bit `4 sample + lane`.
     pub cover: u16,
-    /// The sample shaded, where each sample is shaded for itself.
+    /// The sample that is shaded, in per-sample shading.
     pub sample: u8,
 }
 
 /// The samples of a draw's pixels.
 #[derive(Clone, Copy, Debug)]
 pub struct Samples {
-    /// Where they are, in 1/256 pixels.
+    /// The positions in 1/256 pixels.
     pub positions: &'static [[i32; 2]],
-    /// Whether each is shaded for itself, with its own values.
+    /// True for per-sample shading: each sample is shaded with its own values.
     pub each_shaded: bool,
 }
 
-/// What quads need of their primitive.
+/// The data of a primitive that its quads need.
 #[derive(Clone, Debug)]
 pub struct Record {
-    /// Its number within the instance.
+    /// The primitive's number within the instance.
     id: u32,
     layer: u16,
     pub front: bool,
     pub viewport: u8,
     is_point: bool,
-    /// 1 / w at corners 1 and 2, as [`TriangleSetup::weights`].
+    /// The values of 1 / w at corners 1 and 2; see [`TriangleSetup::weights`].
     weights: [f32; 2],
-    /// What [`BlockValues::inverse_w`] is to be multiplied by.
+    /// The unit of [`BlockValues::inverse_w`].
     scale: f32,
-    /// Derivatives of the barycentrics by x and y in pixels.
+    /// The derivatives of the barycentrics by x and y in pixels.
     slopes: [[f32; 2]; 2],
-    /// Derivatives of [`BlockValues::inverse_w`].
+    /// The derivatives of [`BlockValues::inverse_w`].
     w_slopes: [f32; 2],
-    /// Derivatives of depth.
+    /// The derivatives of depth.
     pub depth_slopes: [f32; 2],
 }
 
-/// Fragments to be shaded together.
+/// Fragments that are shaded together.
 #[derive(Debug)]
 pub struct Batch {
-    /// What is kept of quads' values.
+    /// The values that are stored for each quad.
     needs: Needs,
-    /// The first pixel of the macro-tile in the framebuffer.
+    /// The framebuffer coordinates of the macro-tile's first pixel.
     corner: [u32; 2],
-    /// Its side in tiles.
+    /// The macro-tile's side in tiles.
     side: u32,
-    /// Whether some pixels of quads are not covered.
+    /// True if some pixels of quads are not covered.
     partial: bool,
-    /// Whether it is looked at whether batches are affine.
+    /// True if batches are tested for being affine.
     detects_affine: bool,
-    /// Whether 1 / w is the same all over each primitive, so that barycentrics need no correction.
+    /// True if 1 / w is constant in each primitive, so that barycentrics need no perspective correction.
     affine: bool,
     pub quads: [Quad; QUADS],
     pub count: usize,
-    /// Bit `tile` tells that it has quads of that tile.
+    /// A bit for each tile: 1 if the batch has quads of it.
     tiles: u64,
     pub records: Vec<Record>,
-    /// Of each record, each varying: see [`add_attributes`].
+    /// The varyings of each record: see [`add_attributes`].
     attributes: Vec<[f32; 3]>,
-    /// The barycentrics of corners 1 and 2, lane by lane.
+    /// The linear barycentrics of corners 1 and 2, lane by lane.
     barycentrics: [[f32; LANES]; 2],
-    /// The same, perspective-correct.
+    /// The perspective-correct barycentrics.
     perspective: [[f32; LANES]; 2],
     pub depth: [f32; LANES],
     inverse_w: [f32; LANES],
-    /// The record of all quads of each chunk, if it is the same.
+    /// The record of all quads of each chunk of 16 lanes, if they have the same.
     common: [Option<u16>; LANES / 16],
     pub active: LaneMask,
     pub helpers: LaneMask,
@@ -123,17 +123,17 @@ impl Default for Batch {
     }
 }
 
-/// Values that vary over the pixels of a block, at the centres.
+/// The interpolated values at the pixel centres of a block.
 #[derive(Clone, Copy)]
 pub struct BlockValues<S: Simd> {
     pub barycentrics: [f32x16<S>; 2],
     pub depth: f32x16<S>,
-    /// 1 / w, in units of its value if that is the same everywhere.
+    /// The value of 1 / w. If it is constant in the primitive, it is 1 here, and the unit is in the set-up.
     pub inverse_w: f32x16<S>,
 }
 
 impl<S: Simd> BlockValues<S> {
-    /// Those of the block at pixel (x, y), as far as they are needed.
+    /// The values of the block at pixel (x, y) that are needed.
     #[inline(always)]
     pub fn new(simd: S, setup: &TriangleSetup, [x, y]: [i32; 2], needs: Needs) -> Self {
         let bases = setup.barycentrics(x, y);
@@ -142,7 +142,7 @@ impl<S: Simd> BlockValues<S> {
         values
     }
 
-    /// Depth alone, if it is needed: what early tests take. `bases` are the barycentrics of the block's first pixel.
+    /// The depth alone, if it is needed, for early tests. `bases` are the barycentrics of the block's first pixel.
     #[inline(always)]
     pub fn of_depth(simd: S, setup: &TriangleSetup, bases: [f64; 2], is_needed: bool) -> Self {
         Self {
@@ -156,7 +156,7 @@ impl<S: Simd> BlockValues<S> {
         }
     }
 
-    /// Adds the values besides depth, as far as they are needed.
+    /// Adds the other values that are needed.
     #[inline(always)]
     pub fn find_rest(&mut self, simd: S, setup: &TriangleSetup, bases: [f64; 2], needs: Needs) {
         let add = |base: f32, lanes: [f32; 16]| f32x16::simd_from(simd, lanes) + base;
@@ -171,7 +171,7 @@ impl<S: Simd> BlockValues<S> {
         }
     }
 
-    /// As lanes, in the order of the fields.
+    /// The values as arrays of lanes, in the order of the fields.
     #[inline(always)]
     pub fn lanes(self) -> [[f32; 16]; 4] {
         let [b1, b2] = self.barycentrics;
@@ -185,8 +185,8 @@ impl<S: Simd> BlockValues<S> {
 }
 
 impl Batch {
-    /// Empties it, for a draw whose fragments need this, within a macro-tile: its column and row, and its side in
-    /// pixels.
+    /// Empties the batch for a draw whose fragments have these needs, in the macro-tile at column and row `at`, of
+    /// `size` x `size` pixels.
     pub fn begin(&mut self, needs: Needs, at: [u32; 2], size: u32, optimizations: Optimizations) {
         self.needs = needs;
         self.detects_affine = optimizations.has(Optimization::Affine);
@@ -195,7 +195,7 @@ impl Batch {
         self.clear();
     }
 
-    /// Empties it.
+    /// Removes all quads and records.
     pub fn clear(&mut self) {
         (self.affine, self.partial) = (self.detects_affine, false);
         (self.count, self.tiles) = (0, 0);
@@ -203,7 +203,7 @@ impl Batch {
         self.attributes.clear();
     }
 
-    /// Adds a primitive, of which quads may follow; returns its record.
+    /// Adds the record of a primitive whose quads may follow, and returns its index.
     pub fn add_primitive(
         &mut self,
         primitive: &Primitive,
@@ -228,7 +228,7 @@ impl Batch {
         (self.records.len() - 1) as u16
     }
 
-    /// Adds a quad: `quad` of a block, whose values are given.
+    /// Adds a quad with its values, which are those of quad `number` of a block.
     #[inline(always)]
     pub fn add(&mut self, quad: Quad, number: usize, values: &[[f32; 16]; 4]) {
         let at = 4 * self.count;
@@ -249,7 +249,7 @@ impl Batch {
         self.count += 1;
     }
 
-    /// Adds all four quads of a block, for which there is room.
+    /// Adds all four quads of a block. The batch must have space for them.
     #[inline(always)]
     pub fn add_block<S: Simd>(&mut self, quads: [Quad; 4], values: &BlockValues<S>) {
         let at = 4 * self.count;
@@ -270,12 +270,12 @@ impl Batch {
         self.count += 4;
     }
 
-    /// Whether it has quads of a tile.
+    /// True if it has quads of a tile.
     pub fn has_tile(&self, tile: usize) -> bool {
         self.tiles >> tile & 1 == 1
     }
 
-    /// Chunks of 16 lanes that have quads.
+    /// The number of chunks of 16 lanes that have quads.
     pub fn chunks(&self) -> usize {
         self.count.div_ceil(4)
     }
@@ -287,7 +287,7 @@ impl Batch {
         &chunks[chunk]
     }
 
-    /// Where a chunk's quads are in a tile buffer of `samples` samples a pixel.
+    /// The addresses of a chunk's quads in a tile buffer of `samples` samples per pixel.
     #[inline(always)]
     pub fn places(&self, chunk: usize, sample: usize, samples: usize) -> QuadAddresses {
         let mut first = [0; 4];
@@ -302,10 +302,10 @@ impl Batch {
         }
     }
 
-    /// Whether two quads of a chunk cover the same sample, so that their order matters.
+    /// True if two quads of a chunk cover the same sample, so that their order matters.
     #[inline(always)]
     pub fn overlaps(&self, chunk: usize) -> bool {
-        // A primitive has each sample once.
+        // A primitive covers each sample at most once.
         self.common[chunk].is_none() && self.overlap(chunk)
     }
 
@@ -318,7 +318,7 @@ impl Batch {
         })
     }
 
-    /// Fills up the last chunk, and says which lanes are active and which only help with derivatives.
+    /// Pads the last chunk, and determines the active lanes and the helper lanes for derivatives.
     pub fn prepare(&mut self) {
         let last = self.quads[self.count - 1];
         for quad in &mut self.quads[self.count..4 * self.count.div_ceil(4)] {
@@ -347,8 +347,8 @@ impl Batch {
     }
 }
 
-/// Adds what a primitive's varyings are, in the order of the interface: each one's value at corner 0, and how much more it
-/// is at the others (the value alone if it is flat).
+/// Appends a primitive's varyings in the order of the interface. Each is its value at corner 0 and its differences to
+/// the values at corners 1 and 2. For a flat varying the differences are zero.
 #[inline(always)]
 pub fn add_attributes(
     primitive: &Primitive,
@@ -376,18 +376,18 @@ pub fn add_attributes(
     }
 }
 
-/// A sample's offset from the pixel's centre in pixels, along an axis.
+/// The offset of a sample from the pixel's centre along an axis, in pixels.
 #[inline(always)]
 pub fn offset(position: i32) -> f32 {
     (position - 128) as f32 / 256.0
 }
 
-/// The lanes of a quad of which some sample is covered.
+/// The lanes of a quad that have a covered sample.
 pub fn covered_lanes(cover: u16) -> u16 {
     (cover | cover >> 4 | cover >> 8 | cover >> 12) & 15
 }
 
-/// Values of the block of a sample, from those at the centres.
+/// The values of a block at a sample position, derived from those at the centres.
 #[inline(always)]
 pub fn at_sample<S: Simd>(
     values: &BlockValues<S>,
@@ -407,7 +407,7 @@ pub fn at_sample<S: Simd>(
 }
 
 impl Batch {
-    /// A value of each lane's primitive.
+    /// A value of each lane's primitive, as a vector.
     #[inline(always)]
     fn of_records<S: Simd>(
         &self,
@@ -456,7 +456,7 @@ impl Batch {
         ]
     }
 
-    /// Sets a program's inputs. Returns whether perspective-correct ones needed no division.
+    /// Sets a program's inputs. Returns true if perspective-correct varyings needed no division.
     #[inline(always)]
     pub fn set_inputs<S: Simd>(
         &mut self,
@@ -503,7 +503,7 @@ impl Batch {
         perspective && !divided
     }
 
-    /// A varying of chunks from the first on.
+    /// Interpolates a varying for all chunks of `out`.
     #[inline(always)]
     fn interpolate<S: Simd>(
         &self,
@@ -522,7 +522,7 @@ impl Batch {
         }
     }
 
-    /// Finds perspective-correct barycentrics.
+    /// Computes perspective-correct barycentrics.
     #[inline(always)]
     fn divide<S: Simd>(&mut self, simd: S) {
         for chunk in 0..self.chunks() {
@@ -553,7 +553,7 @@ impl Batch {
         divided(simd, [b1, b2], inverse_w, [w1, w2])
     }
 
-    /// The barycentrics at a sample covered of each lane, the centre if all are.
+    /// The barycentrics and 1 / w of each lane at a covered sample, or at the centre if all samples are covered.
     #[inline(always)]
     fn centroid_at<S: Simd>(
         &self,
@@ -583,7 +583,7 @@ impl Batch {
         ]
     }
 
-    /// The bits of an input for 16 lanes.
+    /// The bits of an input for the 16 lanes of a chunk.
     #[inline(always)]
     fn input<S: Simd>(
         &self,
@@ -596,7 +596,7 @@ impl Batch {
         match kind {
             FragmentInput::Varying { interpolation, .. } => {
                 let attribute = self.attribute(simd, chunk, place, interface.varyings.len());
-                // At the centres it is left to [`Batch::interpolate`].
+                // At the centres, [`Batch::interpolate`] is used.
                 let linear = self.centroid_at(simd, chunk, samples.positions);
                 let barycentrics = match interpolation {
                     Interpolation::Flat => return bits_of(attribute[0]).into(),
@@ -617,7 +617,7 @@ impl Batch {
             FragmentInput::PointCoord(axis) => {
                 let [b1, b2, _] = self.linear_at(simd, chunk);
                 let value = if axis == 0 { b1 + b2 } else { b2 };
-                // Other primitives have none.
+                // Primitives other than points have no point coordinate.
                 let is_point = self.of_records(simd, chunk, |record| f32::from(record.is_point));
                 bits_of(value * is_point).into()
             }
@@ -635,7 +635,7 @@ impl Batch {
         self.corner[axis] + tile * TILE_SIZE + within
     }
 
-    /// As [`Batch::input`], for inputs that follow from the quad.
+    /// The bits of an input that follows from the quad alone, for the 16 lanes of a chunk.
     fn scalar_input(&self, kind: FragmentInput, chunk: usize, samples: Samples) -> [u32; 16] {
         let quads = self.chunk_quads(chunk);
         let mut lanes = [0; 16];
@@ -643,7 +643,7 @@ impl Batch {
             let quad = &quads[number / 4];
             let record = &self.records[usize::from(quad.record)];
             let sample = usize::from(quad.sample);
-            // Samples shaded for themselves are where they are.
+            // In per-sample shading, fragments are at their sample.
             let within = if samples.each_shaded {
                 samples.positions[sample].map(|at| at as f32 / 256.0)
             } else {
@@ -678,13 +678,13 @@ impl Batch {
     }
 }
 
-/// A varying where the barycentrics are these: its value at corner 0 and how much more it is at the others are given.
+/// A varying at these barycentrics, given its value at corner 0 and its differences to the values at corners 1 and 2.
 #[inline(always)]
 pub fn varying<S: Simd>([a, da, db]: [f32x16<S>; 3], [b1, b2]: [f32x16<S>; 2]) -> f32x16<S> {
     db.mul_add(b2, da.mul_add(b1, a))
 }
 
-/// Perspective-correct barycentrics: those of the framebuffer, 1 / w there, and at the corners.
+/// Perspective-correct barycentrics, from the linear ones, 1 / w at the same place, and 1 / w at corners 1 and 2.
 #[inline(always)]
 pub fn divided<S: Simd>(
     simd: S,

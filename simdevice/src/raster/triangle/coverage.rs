@@ -1,5 +1,5 @@
-//! Which samples a primitive covers: exact integer edge functions, first of a tile, then of its 4x4 blocks, then of the
-//! samples.
+//! Coverage: finds the samples that a primitive covers by exact integer edge functions, first for a tile, then for its
+//! 4x4 blocks, then for the samples.
 
 use super::setup::{Edge, TriangleSetup};
 use crate::raster::tile::SIDE;
@@ -7,7 +7,7 @@ use crate::raster::tile::{BLOCK_X, BLOCK_Y, LANE_X, LANE_Y};
 use crate::state::Rect;
 use fearless_simd::{Simd, i32x16, mask32x16, prelude::*};
 
-/// Lanes of a block whose column (or row) is less than the index.
+/// The lanes of a block whose column is less than the index. `ROWS_BELOW` is the same for rows.
 const COLUMNS_BELOW: [u16; 5] = below(LANE_X);
 const ROWS_BELOW: [u16; 5] = below(LANE_Y);
 
@@ -27,15 +27,15 @@ const fn below(of: [i32; 16]) -> [u16; 5] {
     out
 }
 
-/// Edges steeper than this have no 32-bit values within a tile.
+/// The bound of slopes for which an edge's values in a tile fit into 32 bits.
 const MAX_SLOPE: i64 = 1 << 26;
 
 /// The samples of a tile that a primitive covers.
 #[derive(Clone, Debug)]
 pub struct Coverage<const N: usize> {
-    /// Bit `block` tells that some sample of the block may be covered.
+    /// A bit for each block: 1 if a sample of it may be covered.
     pub blocks: u32,
-    /// The lanes covered of each sample of each block; nothing where `blocks` says so.
+    /// The covered lanes for each block and sample. Undefined for blocks whose bit in `blocks` is 0.
     pub lanes: [[u16; N]; 16],
 }
 
@@ -56,8 +56,8 @@ struct Crossing<'a, const N: usize> {
 }
 
 impl<const N: usize> Coverage<N> {
-    /// Finds the samples covered of the tile at pixel (x, y), none outside the primitive's bounds. Returns whether
-    /// there may be any.
+    /// Finds the covered samples of the tile at pixel (x, y), within the primitive's bounds. Returns true if there may
+    /// be any.
     #[inline(always)]
     pub fn find<S: Simd>(&mut self, simd: S, setup: &TriangleSetup, x: i32, y: i32) -> bool {
         self.blocks = 0;
@@ -70,7 +70,7 @@ impl<const N: usize> Coverage<N> {
         if part.is_empty() {
             return false;
         }
-        // In pixels from the tile's corner.
+        // The coordinates are in pixels from the tile's corner.
         let (left, top) = (part.x - x, part.y - y);
         let (right, bottom) = (left + part.width as i32, top + part.height as i32);
         let mut crossings = [Crossing {
@@ -119,7 +119,7 @@ impl<const N: usize> Coverage<N> {
         self.blocks != 0
     }
 
-    /// Whether every sample of the tile is covered.
+    /// True if every sample of the tile is covered.
     pub fn is_whole(&self) -> bool {
         self.blocks == 0xFFFF
             && self
@@ -129,7 +129,7 @@ impl<const N: usize> Coverage<N> {
                 .all(|&lanes| lanes == u16::MAX)
     }
 
-    /// Removes lanes outside of columns and rows.
+    /// Removes lanes outside of these columns and rows.
     #[inline(always)]
     fn cut(&mut self, [left, right]: [i32; 2], [top, bottom]: [i32; 2]) {
         for block in bits(self.blocks) {
@@ -146,7 +146,7 @@ impl<const N: usize> Coverage<N> {
         }
     }
 
-    /// Every lane of a few blocks.
+    /// Evaluates every lane of a few blocks.
     #[inline(always)]
     fn evaluate_few<S: Simd>(&mut self, simd: S, crossings: &[Crossing<'_, N>]) {
         for block in bits(self.blocks) {
@@ -167,7 +167,7 @@ impl<const N: usize> Coverage<N> {
         }
     }
 
-    /// Blocks first, then the lanes of those that edges cross.
+    /// Evaluates whole blocks first, then the lanes of blocks that edges cross.
     #[inline(always)]
     fn evaluate_blocks<S: Simd>(&mut self, simd: S, crossings: &[Crossing<'_, N>]) {
         let mut values = [[0i32; 16]; 4];
@@ -212,7 +212,7 @@ impl<const N: usize> Coverage<N> {
         }
     }
 
-    /// Every lane in 64 bits, for edges so long that 32 do not do.
+    /// Evaluates every lane in 64 bits, for edges too steep for 32 bits.
     #[cold]
     fn evaluate_wide(&mut self, crossings: &[Crossing<'_, N>]) {
         for block in bits(self.blocks) {
@@ -232,7 +232,7 @@ impl<const N: usize> Coverage<N> {
     }
 }
 
-/// The numbers of the bits set, ascending.
+/// The numbers of the bits that are set, in ascending order.
 #[inline(always)]
 pub fn bits(mut word: u32) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {

@@ -1,5 +1,5 @@
-//! A draw's state made ready for tiles, once for all workers: what its fragments need, when they are tested, where they
-//! go, and which path they take.
+//! The preparation of a draw for its tiles, once for all workers: the values that its fragments need, the tests and
+//! their time, the outputs, and the path of fragments.
 
 use super::batch::Samples;
 use super::setup::Needs;
@@ -21,20 +21,20 @@ use std::time::Duration;
 /// The path of a draw's fragments from coverage to the attachments.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Path {
-    /// Depth and stencil are tested first. A tile that a primitive covers waits to be shaded until it is clear that no
-    /// other overwrites it; one is a batch of its own if `batches_tiles`.
+    /// Depth and stencil are tested first. A tile that a primitive covers completely is shaded only when no later
+    /// primitive can overwrite it. It is a batch of its own if `batches_tiles`.
     Deferred { batches_tiles: bool },
-    /// Depth and stencil are tested first. A tile that a primitive covers is a batch of its own: fragments take nothing
-    /// but varyings.
+    /// Depth and stencil are tested first. A tile that a primitive covers completely is a batch of its own. The only
+    /// inputs of fragments are varyings.
     WholeTiles,
-    /// Depth and stencil are tested first, and quads are gathered to batches.
+    /// Depth and stencil are tested first, and quads are collected in batches.
     EarlyTests,
-    /// Quads are gathered to batches, and depth and stencil are tested after shading.
+    /// Quads are collected in batches, and depth and stencil are tested after shading.
     LateTests,
 }
 
 impl Path {
-    /// Tells whether a tile that a primitive covers is a batch of its own.
+    /// True if a tile that a primitive covers completely is a batch of its own.
     pub(super) fn batches_tiles(self) -> bool {
         matches!(
             self,
@@ -46,37 +46,37 @@ impl Path {
     }
 }
 
-/// A draw made ready for tiles, which all workers share.
+/// A draw that is prepared for its tiles. All workers share it.
 pub struct TriangleTileDraw<'a> {
     pub(super) draw: &'a PrimitiveDraw,
-    /// The program, if it must run.
+    /// The fragment program, if it must run.
     pub(super) stage: Option<&'a FragmentStage>,
     pub(super) bindings: BoundResources<'a>,
     pub(super) targets: Targets<'a>,
     pub(super) colors: Vec<Option<ColorOutput>>,
     pub(super) path: Path,
     pub(super) tests: Tests,
-    /// The tests before shading, if there are any: all, or what fails for good of those that come after it.
+    /// The tests before shading, if there are any: all tests, or those of the late tests that reject fragments early.
     pub(super) early: Option<Tests>,
-    /// Shading may take samples away.
+    /// True if shading may remove samples.
     pub(super) removes: bool,
-    /// Samples are counted after shading.
+    /// True if samples are counted after shading.
     pub(super) counts_late: bool,
     pub(super) samples: Samples,
     /// The pixels that the pass may touch.
     pub(super) area: Rect,
-    /// Of each viewport: the range that depth is clamped to.
+    /// The range to which depth is clamped, for each viewport.
     pub(super) ranges: Vec<(f32, f32)>,
     /// The values that fragments need.
     pub(super) needs: Needs,
-    /// The work that is left out in its tiles.
+    /// The optimizations that are enabled in its tiles.
     pub(super) optimizations: Optimizations,
     pub(super) level: Level,
     pub(super) limit: Duration,
 }
 
 impl<'a> TriangleTileDraw<'a> {
-    /// Makes a draw ready. `samples` are the attachments' samples, if there are attachments.
+    /// Prepares a draw. `samples` is the number of the attachments' samples, if there are attachments.
     pub fn new(
         draw: &'a PrimitiveDraw,
         targets: Targets<'a>,
@@ -119,7 +119,7 @@ impl<'a> TriangleTileDraw<'a> {
             && state.sample_mask & 1 == 1
             && !effects.removes
             && !state.alpha_to_one
-            // The record is of what hardware does that takes quads.
+            // A recording describes hardware that processes quads.
             && draw.record.is_none();
         let path = match interface {
             _ if effects.tests_late => Path::LateTests,
@@ -153,17 +153,17 @@ impl<'a> TriangleTileDraw<'a> {
         }
     }
 
-    /// Tells whether all that is covered is written.
+    /// True if all covered samples are written.
     pub(super) fn writes_all(&self) -> bool {
         !self.tests.any() && !self.removes
     }
 
-    /// Tells whether nothing happens to a fragment between shading and blending.
+    /// True if nothing happens to a fragment between shading and blending.
     pub(super) fn blends_directly(&self) -> bool {
         self.path != Path::LateTests && !self.removes && !self.draw.state.alpha_to_one
     }
 
-    /// Marks what its program may have written to as changed.
+    /// Marks the memory that its program may have written as changed.
     pub fn finish(&self) {
         if self.stage.is_some() {
             self.draw.bindings.bump_generations();
@@ -171,16 +171,16 @@ impl<'a> TriangleTileDraw<'a> {
     }
 }
 
-/// The effects of a program on which samples there are, and when they are known.
+/// The effects of a program on samples, and the time of the tests.
 #[derive(Clone, Copy, Debug, Default)]
 struct ShadingEffects {
-    /// Samples may be taken away.
+    /// True if samples may be removed.
     removes: bool,
-    /// Depth and stencil have to be tested after shading.
+    /// True if depth and stencil must be tested after shading.
     tests_late: bool,
-    /// What can be tested early of late tests.
+    /// The part of late tests that can be done early.
     filter: Option<Tests>,
-    /// Samples have to be counted after shading.
+    /// True if samples must be counted after shading.
     counts_late: bool,
 }
 
@@ -204,7 +204,7 @@ impl ShadingEffects {
     }
 }
 
-/// The path of a draw that may take whole tiles at once.
+/// The path of a draw that may process whole tiles at once.
 fn whole_tile_path(
     interface: &Interface,
     colors: &[Option<ColorOutput>],
@@ -223,7 +223,7 @@ fn whole_tile_path(
     }
 }
 
-/// The range that depth is clamped to in each viewport.
+/// The range to which depth is clamped in each viewport.
 fn depth_ranges(state: &DrawState) -> Vec<(f32, f32)> {
     let range = |viewport: &Viewport| {
         let (a, b) = (viewport.min_depth, viewport.max_depth);

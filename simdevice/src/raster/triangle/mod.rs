@@ -1,6 +1,6 @@
-//! Triangle mode of the tile engine: [`draw`] makes a draw ready and chooses its path through a tile, [`render`] takes its
-//! primitives through [`setup`], [`coverage`] and early tests to a [`batch`] or, where they cover a [`whole_tile`], at once,
-//! and [`write`] takes what was shaded to the attachments.
+//! Triangle mode of the tile engine. [`draw`] prepares a draw and chooses its path through a tile. [`render`] runs
+//! [`setup`], [`coverage`] and early tests for each primitive, and adds its quads to a [`batch`] or shades a
+//! [`whole_tile`] at once. [`write`] writes shaded fragments to the attachments.
 
 mod batch;
 mod coverage;

@@ -1,4 +1,4 @@
-//! The account of points, lines and triangles: what came before their tiles, and what they did in each.
+//! The record of the work of points, lines and triangles: before their tiles, and in each tile.
 
 use crate::geometry::PrimitiveDraw;
 use crate::limits::{MAX_MACRO_TILE_SIZE, TILE_SIZE};
@@ -7,10 +7,10 @@ use crate::stats::counters::{Counter, Counters};
 use crate::stats::recorder::{DrawRecord, ShaderWork, shader_work, sized_tiles};
 use timing::work::{DrawWork, Mode, Run, TILE_GROUPS, TileWork};
 
-/// Numbers of a primitive that the rasterizer takes; GauRast, Table II.
+/// The numbers per primitive that the rasterizer reads; GauRast, Table II.
 const NUMBERS_IN: u64 = 9;
 
-/// What a draw does in the tiles of a macro-tile.
+/// The work of a draw in the tiles of a macro-tile.
 #[derive(Debug)]
 pub(crate) struct MacroTileWork {
     tiles: Vec<TileWork>,
@@ -26,7 +26,7 @@ impl Default for MacroTileWork {
 }
 
 impl MacroTileWork {
-    /// A primitive's bounding box touches a tile, and it covers so many 4x4 blocks of it.
+    /// Records a primitive whose bounding box touches a tile and which covers `blocks` of its 4x4 blocks.
     pub(crate) fn list(&mut self, tile: usize, blocks: u32) {
         let tile = &mut self.tiles[tile];
         tile.listed += 1;
@@ -43,7 +43,7 @@ impl MacroTileWork {
         }
     }
 
-    /// The primitive that was listed last is hidden in all of a tile.
+    /// Records that the primitive that was listed last is hidden in all of a tile.
     pub(crate) fn hide(&mut self, tile: usize, blocks: u32) {
         let tile = &mut self.tiles[tile];
         for run in &mut tile.runs {
@@ -53,7 +53,7 @@ impl MacroTileWork {
         }
     }
 
-    /// Of a block's lanes that were covered, by sample, early tests left some.
+    /// Records the early tests of a block: the covered lanes and those that passed, both by sample.
     pub(crate) fn test<const N: usize>(
         &mut self,
         tile: usize,
@@ -73,7 +73,7 @@ impl MacroTileWork {
     }
 }
 
-/// A draw of primitives of which nothing is known yet.
+/// The record of a draw of primitives before any work.
 pub(crate) fn no_primitives() -> DrawWork {
     DrawWork {
         mode: Mode::Triangle,
@@ -81,7 +81,7 @@ pub(crate) fn no_primitives() -> DrawWork {
     }
 }
 
-/// Adds what came before the tiles of a part of a draw; `counters` are those of it alone.
+/// Adds the work of a part of a draw before its tiles. `counters` are those of the part alone.
 pub(crate) fn add_front_end(
     record: &DrawRecord,
     counters: &Counters,
@@ -92,7 +92,7 @@ pub(crate) fn add_front_end(
     let drawn = counters.get(Counter::PrimitivesDrawn);
     let attributes = draw.attributes.iter();
     let read: usize = attributes.map(|stream| stream.format.texel_size()).sum();
-    // A position and the varyings.
+    // A vertex's outputs are a position and the varyings.
     let written = 4 * (4 + part.varyings_per_vertex() as u64);
     let index = draw
         .indices
@@ -124,7 +124,7 @@ pub(crate) fn add_front_end(
         work.primitives += counters.get(Counter::InputPrimitives);
         work.drawn += drawn;
         work.preprocess = work.preprocess.plus(&preprocess);
-        // Lists are made beside the shader cores, and cost them nothing but memory.
+        // Lists are built outside of the shader cores, and cost only memory traffic.
         work.sort.bytes += 4.0 * sized[1] as f64;
         for (sum, tiles) in work.sized_pairs.iter_mut().zip(sized) {
             *sum += tiles;
@@ -132,7 +132,7 @@ pub(crate) fn add_front_end(
     });
 }
 
-/// Adds what was done in macro-tile `at` of `size` pixels; `counters` are those of it alone.
+/// Adds the work in macro-tile `at` of `size` x `size` pixels. `counters` are those of the macro-tile alone.
 pub(crate) fn add_macro_tile(
     record: &DrawRecord,
     at: [u32; 2],
@@ -165,7 +165,7 @@ mod tests {
     fn quads_and_blocks_are_counted_once() {
         let mut work = MacroTileWork::default();
         work.list(3, 5);
-        // Lanes of a quad are consecutive: of three quads covered, early tests leave one.
+        // Lanes of a quad are consecutive. Of three covered quads, early tests leave one.
         work.test(3, &[0x0F31], &[0x0030]);
         work.test(3, &[0x0001, 0x0002], &[0x0001, 0]);
         work.list(3, 16);

@@ -1,5 +1,4 @@
-//! Triangle mode of the tile engine: the primitives of a draw, one after another, through coverage, early tests and
-//! shading.
+//! Triangle mode of the tile engine: coverage, early tests and shading of the primitives of a draw, in order.
 
 use super::batch::{Batch, BlockValues, QUADS, Quad, add_attributes, at_sample, offset};
 use super::coverage::{Coverage, bits};
@@ -25,7 +24,7 @@ use fearless_simd::{Simd, f32x16};
 use isa::machine::{Stopped, Watchdog};
 use std::sync::atomic::AtomicBool;
 
-/// The memory that a worker needs besides.
+/// The memory that a worker reuses from one macro-tile to the next.
 #[derive(Debug, Default)]
 pub struct Scratch {
     batch: Box<Batch>,
@@ -33,23 +32,20 @@ pub struct Scratch {
     deferred: Box<DeferredTiles>,
 }
 
-/// From how many blocks of a tile on it pays to ask whether a primitive is hidden in all of it.
+/// The least number of covered blocks of a tile for which a test of the whole tile against stored depths pays.
 const HIDDEN_BLOCKS: u32 = 6;
 
 /// The macro-tile that a worker renders.
 #[derive(Clone, Copy, Debug)]
 pub struct MacroTile {
     pub layer: u32,
-    /// Column and row of the macro-tile.
+    /// The column and row of the macro-tile.
     pub at: [u32; 2],
-    /// Its side in pixels.
+    /// The side of the macro-tile in pixels.
     pub size: u32,
 }
 
-/// Renders what a draw covers of a macro-tile.
-///
-/// # Errors
-/// [`Stopped`] if its program ran for too long, or `cancel` was set.
+/// Renders a draw in a macro-tile.
 pub fn render(
     draw: &TriangleTileDraw<'_>,
     macro_tile: MacroTile,
@@ -119,7 +115,7 @@ pub fn render(
     done
 }
 
-/// A draw in a macro-tile.
+/// The state of rendering a draw in a macro-tile.
 pub(super) struct Renderer<'a, 'd> {
     pub draw: &'a TriangleTileDraw<'d>,
     pub macro_tile: MacroTile,
@@ -130,37 +126,37 @@ pub(super) struct Renderer<'a, 'd> {
     pub counters: &'a mut Counters,
     pub cancel: &'a AtomicBool,
     pub samples_passed: u64,
-    /// Quads that were not shaded, because nothing is left of them.
+    /// The number of quads that were not shaded, because they have no sample left.
     pub quads_masked: u64,
-    /// What is done in each tile, if anybody wants to know.
+    /// The work in each tile, if there is a recorder.
     pub work: Option<MacroTileWork>,
 }
 
 /// A tile of the macro-tile.
 #[derive(Clone, Copy)]
 struct PlacedTile {
-    /// Row by row within the macro-tile.
+    /// The index in the macro-tile, row by row.
     index: usize,
-    /// The first pixel in the framebuffer.
+    /// The framebuffer coordinates of the first pixel.
     corner: [i32; 2],
 }
 
-/// A primitive while it is rasterized.
+/// A primitive during rasterization.
 struct RasterPrimitive<'p> {
     primitive: &'p Primitive,
     varyings: &'p Varyings,
     setup: &'p TriangleSetup,
-    /// Its segment among the draw's, and its number there.
+    /// The number of the primitive's segment in the draw, and the primitive's number in the segment.
     place: (usize, u32),
-    /// Its record in the batch, once it has one.
+    /// The primitive's record in the batch, if it has one.
     record: Option<u16>,
-    /// Its slot among deferred primitives, once a tile waits for it.
+    /// The primitive's slot among deferred primitives, if a tile is deferred for it.
     slot: Option<u8>,
     range: (f32, f32),
 }
 
 impl Renderer<'_, '_> {
-    /// All primitives.
+    /// Rasterizes all primitives of the macro-tile, then shades deferred tiles.
     #[inline(always)]
     fn run<S: Simd, const N: usize>(
         &mut self,
@@ -221,14 +217,14 @@ impl Renderer<'_, '_> {
         Ok(())
     }
 
-    /// What a primitive's depth is clamped to.
+    /// The range to which a primitive's depth is clamped.
     #[inline(always)]
     fn depth_range(&self, primitive: &Primitive) -> (f32, f32) {
         let range = self.draw.ranges.get(usize::from(primitive.viewport));
         range.copied().unwrap_or((0.0, 1.0))
     }
 
-    /// One primitive, tile by tile.
+    /// Rasterizes one primitive, tile by tile.
     #[inline(always)]
     fn primitive<S: Simd, const N: usize>(
         &mut self,
@@ -274,7 +270,7 @@ impl Renderer<'_, '_> {
         Ok(())
     }
 
-    /// A tile of which a primitive covers something.
+    /// Processes a tile of which a primitive covers some samples.
     #[inline(always)]
     fn tile<S: Simd, const N: usize>(
         &mut self,
@@ -303,7 +299,7 @@ impl Renderer<'_, '_> {
             }
             Path::Deferred { .. } if N == 1 && deferred.is_deferred(tile.index) => {
                 self.shade_deferred(simd, deferred, tile.index)?;
-                // The batch may have begun anew.
+                // The batch may have been emptied.
                 current.record = None;
             }
             _ => {}
@@ -311,7 +307,7 @@ impl Renderer<'_, '_> {
         self.blocks(simd, current, coverage, tile)
     }
 
-    /// What a primitive covers of a tile, block by block: early tests, then the batch.
+    /// Processes a primitive's covered blocks of a tile: early tests, then the batch.
     #[inline(always)]
     fn blocks<S: Simd, const N: usize>(
         &mut self,
@@ -381,7 +377,7 @@ impl Renderer<'_, '_> {
         Ok(())
     }
 
-    /// As [`Renderer::append`], once for each sample, with its own values.
+    /// Adds the quads of a block as [`Renderer::append`] does, once for each sample with its own values.
     #[inline(always)]
     fn append_samples<S: Simd, const N: usize>(
         &mut self,
@@ -406,8 +402,8 @@ impl Renderer<'_, '_> {
         Ok(())
     }
 
-    /// Adds the quads of a block that have samples to the batch, which is shaded when it is full. `quad` is the
-    /// block's first.
+    /// Adds the quads of a block that have samples to the batch, which is shaded when it is full. `quad` is the block's
+    /// first quad.
     #[inline(always)]
     fn append<S: Simd, const N: usize>(
         &mut self,
@@ -476,7 +472,7 @@ impl Renderer<'_, '_> {
         record
     }
 
-    /// The early tests of a block.
+    /// Runs the early tests of a block.
     #[inline(always)]
     fn test<S: Simd, const N: usize>(
         &mut self,
@@ -513,7 +509,8 @@ impl Renderer<'_, '_> {
         }
     }
 
-    /// Tells whether a primitive fails the depth test in all of a tile, if that is looked at.
+    /// True if a primitive fails the depth test in all of a tile. False if the mode or the optimizations do not allow
+    /// this test.
     #[inline(always)]
     fn is_hidden<S: Simd>(
         &mut self,
@@ -538,7 +535,7 @@ impl Renderer<'_, '_> {
         hidden
     }
 
-    /// Shades what the batch has.
+    /// Shades the quads of the batch and empties it.
     #[inline(never)]
     pub fn flush(&mut self) -> Result<(), Stopped> {
         let programs = self.draw.stage.zip(self.machines.as_mut());
@@ -580,7 +577,7 @@ impl Renderer<'_, '_> {
         Ok(())
     }
 
-    /// Makes sure that depth and stencil of a tile are there.
+    /// Loads or clears depth and stencil of a tile if it was not touched yet.
     fn load_tests(&mut self, tile: usize) {
         let (targets, layer) = (self.draw.targets, self.macro_tile.layer);
         if let Some(target) = targets
@@ -599,7 +596,7 @@ impl Renderer<'_, '_> {
         }
     }
 
-    /// Makes sure that a tile of the colours written is there.
+    /// Loads or clears the colours of a tile that the draw writes, if it was not touched yet.
     #[inline(always)]
     fn load_colors<const N: usize>(&mut self, tile: usize, coverage: &Coverage<N>) {
         for (index, output) in self.draw.colors.iter().enumerate() {
@@ -607,7 +604,7 @@ impl Renderer<'_, '_> {
             if self.buffers.color[index].is_touched(tile) {
                 continue;
             }
-            // What is overwritten as a whole need not be loaded or cleared.
+            // Texels that are all overwritten need not be loaded or cleared.
             let state = &self.draw.draw.state;
             if self.draw.writes_all()
                 && output.overwrites()
@@ -624,7 +621,7 @@ impl Renderer<'_, '_> {
         }
     }
 
-    /// The tile of an index.
+    /// The tile with an index in the macro-tile.
     #[cold]
     fn tile_of(&self, index: usize) -> Tile {
         let side = self.macro_tile.size / TILE_SIZE;
@@ -646,7 +643,7 @@ impl Renderer<'_, '_> {
         }
     }
 
-    /// Makes sure that a tile of the colours written is there, of which nothing will be left.
+    /// Marks the colours of a tile as overwritten, or loads them if that optimization is disabled.
     fn mark_colors_overwritten(&mut self, tile: usize) {
         if !self.draw.optimizations.has(Optimization::OverwrittenTiles) {
             return self.load_colors_written(tile);
@@ -659,7 +656,8 @@ impl Renderer<'_, '_> {
         }
     }
 
-    /// Makes sure that a tile of the colours written is there, with what it holds.
+    /// Loads or clears the colours of a tile that the draw writes, if it was not touched yet, even if they will be
+    /// overwritten.
     fn load_colors_written(&mut self, tile: usize) {
         for (index, output) in self.draw.colors.iter().enumerate() {
             if output.is_some()
@@ -672,7 +670,7 @@ impl Renderer<'_, '_> {
         }
     }
 
-    /// A tile that a primitive covers as a whole, in a draw with one sample a pixel.
+    /// Processes a tile that a primitive covers completely, in a draw with one sample per pixel.
     #[inline(always)]
     fn whole_tile<S: Simd, const N: usize>(
         &mut self,
@@ -707,13 +705,13 @@ impl Renderer<'_, '_> {
         }
         if deferred.is_deferred(tile.index) {
             self.shade_deferred(simd, deferred, tile.index)?;
-            // The batch may have begun anew.
+            // The batch may have been emptied.
             current.record = None;
         }
         self.shade_tile(simd, current, tile, &lanes)
     }
 
-    /// Lets a tile wait for a primitive, of which all passes.
+    /// Defers a tile of a primitive whose samples all pass.
     #[inline(always)]
     fn defer(
         &mut self,
@@ -737,7 +735,7 @@ impl Renderer<'_, '_> {
         }
     }
 
-    /// Shades a tile that waits, if it does.
+    /// Shades a tile if it is deferred.
     fn shade_deferred<S: Simd>(
         &mut self,
         simd: S,
@@ -774,7 +772,7 @@ impl Renderer<'_, '_> {
         )
     }
 
-    /// Shades lanes of a tile's blocks, of which nothing is left to be tested, in a draw with one sample a pixel.
+    /// Shades the given lanes of a tile's blocks, which have passed all tests, in a draw with one sample per pixel.
     #[inline(always)]
     fn shade_tile<S: Simd>(
         &mut self,
@@ -810,7 +808,7 @@ impl Renderer<'_, '_> {
         Ok(())
     }
 
-    /// Shades a tile, whose colours are there, as a batch of its own.
+    /// Shades a completely covered tile as a batch of its own. Its colours must be loaded.
     #[inline(always)]
     fn shade_full_tile<S: Simd>(
         &mut self,
@@ -822,7 +820,7 @@ impl Renderer<'_, '_> {
         let Some(stage) = draw.stage else {
             return Ok(());
         };
-        // Earlier fragments of the tile come first.
+        // Earlier fragments of the tile are shaded first.
         if self.batch.has_tile(tile.index) {
             self.flush()?;
             current.record = None;

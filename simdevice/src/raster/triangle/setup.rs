@@ -1,4 +1,4 @@
-//! A primitive made ready for tiles: its edges as exact integers, and what varies over it as planes.
+//! Triangle set-up for tiles: edges as exact integer functions, and interpolated values as planes.
 
 use crate::geometry::{Primitive, PrimitiveKind};
 use crate::raster::tile::{LANE_X, LANE_Y};
@@ -6,66 +6,67 @@ use crate::simd::{both, three};
 use crate::state::Rect;
 use fearless_simd::{Simd, f32x16, i32x16, prelude::*};
 
-/// Primitives reach at most this far from the framebuffer's corner, in 1/256 pixels, so that edge functions fit 64 bits;
-/// others are not drawn.
+/// The greatest distance of a primitive from the framebuffer's corner, in 1/256 pixels, for which edge functions fit
+/// into 64 bits. Larger primitives are not drawn.
 pub const MAX_COORDINATE: i32 = 1 << 29;
 
-/// Sub-pixel positions of a pixel.
+/// The number of sub-pixel positions in a pixel.
 const ONE: i64 = 256;
 
-/// Units of [`Primitive::offsets`] in 1/256 pixel.
+/// The number of units of [`Primitive::offsets`] in 1/256 pixel.
 const OFFSETS_IN_SUB_PIXEL: f64 = 65_536.0;
 
-/// An edge: a sample of pixel (x, y) is inside if `a x + b y + c[sample] >= 0`. Dividing the edge function of 1/256
-/// pixels by 256 and rounding down changes no sign, since `a x + b y` is an integer.
+/// An edge function: a sample of pixel (x, y) is inside if `a x + b y + c[sample] >= 0`. It is the edge function in
+/// 1/256 pixels, divided by 256 and rounded down. That changes no sign, since `a x + b y` is an integer.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Edge {
     pub a: i64,
     pub b: i64,
     pub c: [i64; 4],
-    /// `a x + b y` of the lanes of a block, if they fit.
+    /// The values of `a x + b y` for the lanes of a block, if they fit into 32 bits.
     pub lanes: [i32; 16],
 }
 
-/// What of a primitive does not depend on tiles.
+/// The data of a primitive that do not depend on the tile.
 #[derive(Clone, Debug, Default)]
 pub struct TriangleSetup {
     edges: [Edge; 4],
     edge_count: usize,
-    /// The pixels that may have samples in it.
+    /// The pixels that may have covered samples.
     pub bounds: Rect,
     origin: [i64; 2],
-    /// How the barycentrics' numerators of corners 1 and 2 grow with x and y, per 1/256 pixel, were the vertices at the
-    /// corners.
+    /// The gradients by x and y, per 1/256 pixel, of the barycentrics' numerators of corners 1 and 2, without the
+    /// correction for snapping.
     numerators: [[i64; 2]; 2],
     correction: SnapCorrection,
     inverse_area: f64,
-    /// What the barycentrics add at each lane of a block.
+    /// The differences of the barycentrics from a block's first pixel to each lane.
     pub lane_barycentrics: [[f32; 16]; 2],
     /// The barycentrics' derivatives by x and y in pixels.
     pub slopes: [[f32; 2]; 2],
     depth: [f64; 3],
-    /// What depth adds at each lane of a block.
+    /// The differences of depth from a block's first pixel to each lane.
     pub lane_depth: [f32; 16],
-    /// Depth's derivatives.
+    /// The derivatives of depth by x and y in pixels.
     pub depth_slopes: [f32; 2],
     inverse_w: [f64; 3],
-    /// What 1 / w adds at each lane of a block.
+    /// The differences of 1 / w from a block's first pixel to each lane.
     pub lane_w: [f32; 16],
-    /// The derivatives of 1 / w.
+    /// The derivatives of 1 / w by x and y in pixels.
     pub w_slopes: [f32; 2],
-    /// 1 / w at corners 1 and 2, in units of `scale`.
+    /// The values of 1 / w at corners 1 and 2, in units of `scale`.
     pub weights: [f32; 2],
-    /// Whether 1 / w is the same at all corners.
+    /// True if 1 / w is the same at all corners.
     pub affine: bool,
-    /// What 1 / w is in units of: its value if it is the same at all corners, so that nothing is lost.
+    /// The unit of 1 / w: its value if it is the same at all corners, so that no digits are lost; otherwise 1.
     pub scale: f32,
 }
 
-/// What barycentrics owe to the vertices not being at the corners, but where they were before snapping.
+/// The correction of barycentrics for snapping. Corners are snapped, but the vertices' values apply at their positions
+/// before snapping.
 #[derive(Clone, Copy, Debug, Default)]
 struct SnapCorrection {
-    /// To be added to [`TriangleSetup::numerators`].
+    /// The correction that is added to [`TriangleSetup::numerators`].
     numerators: [[f64; 2]; 2],
     /// The barycentrics' numerators at corner 0.
     at_origin: [f64; 2],
@@ -74,7 +75,7 @@ struct SnapCorrection {
 }
 
 impl SnapCorrection {
-    /// Of vertices that are at the corners, which enclose half of `area`.
+    /// The correction for vertices at their corners, which enclose half of `area`.
     fn nowhere(area: i64) -> Self {
         Self {
             area: area as f64,
@@ -82,8 +83,8 @@ impl SnapCorrection {
         }
     }
 
-    /// `None` for needles that snapping has turned over or made much wider, whose samples may lie far outside of what
-    /// they were.
+    /// The correction for vertices at `offsets` from the corners. `None` for very thin triangles that snapping has
+    /// turned over or made much wider, because their samples may lie far outside of the original triangle.
     #[inline(always)]
     fn new(numerators: [[i64; 2]; 2], area: i64, offsets: [[i16; 2]; 3]) -> Option<Self> {
         let [o0, o1, o2] = three(offsets, |offset| {
@@ -95,7 +96,7 @@ impl SnapCorrection {
         ];
         let [[a1, b1], [a2, b2]] = both(numerators, |n| both(n, |n| n as f64));
         let [[c1, d1], [c2, d2]] = by;
-        // The large part is exact.
+        // The large part of the sum is exact.
         let larger = a1 * d2 + c1 * (b2 + d2) - b1 * c2 - d1 * (a2 + c2);
         let snapped = area as f64;
         (snapped + larger >= 0.25 * snapped).then(|| Self {
@@ -109,7 +110,7 @@ impl SnapCorrection {
     }
 }
 
-/// Pixels that may have samples between two coordinates of 1/256 pixels, as `first..end`.
+/// The pixels, as `first..end`, that may have samples between two coordinates of 1/256 pixels.
 fn pixels(low: i32, high: i32, samples: usize) -> (i32, i32) {
     if samples == 1 {
         ((low + 127) >> 8, ((high - 128) >> 8) + 1)
@@ -119,8 +120,8 @@ fn pixels(low: i32, high: i32, samples: usize) -> (i32, i32) {
 }
 
 impl TriangleSetup {
-    /// Becomes that of a primitive; returns false, and is undefined, if none of its samples lies in `clip`. What lanes
-    /// add is found only as far as it is needed.
+    /// Sets up a primitive. Returns false, and leaves the value undefined, if none of its samples lies in `clip`.
+    /// Differences for lanes are computed only as far as `needs` says.
     #[inline(always)]
     pub fn prepare<S: Simd>(
         &mut self,
@@ -228,7 +229,7 @@ impl TriangleSetup {
         true
     }
 
-    /// Its edges.
+    /// The edge functions of the primitive.
     #[inline(always)]
     pub fn edges(&self) -> &[Edge] {
         &self.edges[..self.edge_count]
@@ -239,7 +240,7 @@ impl TriangleSetup {
     pub fn barycentrics(&self, x: i32, y: i32) -> [f64; 2] {
         let dx = i64::from(x) * ONE + ONE / 2 - self.origin[0];
         let dy = i64::from(y) * ONE + ONE / 2 - self.origin[1];
-        // The large part is exact.
+        // The large part of the sum is exact.
         let numerator = |corner: usize| {
             let ([a, b], [c, d]) = (self.numerators[corner], self.correction.numerators[corner]);
             let small = c * dx as f64 + d * dy as f64 + self.correction.at_origin[corner];
@@ -248,26 +249,26 @@ impl TriangleSetup {
         [numerator(0), numerator(1)]
     }
 
-    /// Depth where the barycentrics are these.
+    /// The depth at these barycentrics.
     #[inline(always)]
     pub fn depth(&self, [b1, b2]: [f64; 2]) -> f32 {
         let [z0, z1, z2] = self.depth;
         (z0 + b1 * (z1 - z0) + b2 * (z2 - z0)) as f32
     }
 
-    /// Bounds of depth at its samples within the tile at pixel (x, y), rounding included.
+    /// The least and the greatest depth at its samples in the tile at pixel (x, y), with a margin for rounding.
     #[inline(always)]
     pub fn depth_bounds(&self, x: i32, y: i32) -> [f32; 2] {
         let half = crate::raster::tile::SIDE as i32 / 2;
         let middle = self.depth(self.barycentrics(x + half, y + half));
         let [dx, dy] = both(self.depth_slopes, f32::abs);
-        // From the middle of the pixel beside the tile's middle, samples are at most 8.5 pixels away.
+        // Samples are at most 8.5 pixels from the centre of the pixel next to the tile's middle.
         let reach = 8.6 * (dx + dy);
         let margin = 1e-5 * (middle.abs() + reach) + f32::MIN_POSITIVE;
         [middle - reach - margin, middle + reach + margin]
     }
 
-    /// 1 / w in units of [`TriangleSetup::scale`] where the barycentrics are these.
+    /// The value of 1 / w at these barycentrics, in units of [`TriangleSetup::scale`].
     #[inline(always)]
     pub fn inverse_w(&self, [b1, b2]: [f64; 2]) -> f32 {
         let [w0, w1, w2] = self.inverse_w;
@@ -275,7 +276,7 @@ impl TriangleSetup {
     }
 }
 
-/// The columns and rows of lanes as floats.
+/// The columns of lanes as floats; `FLOAT_Y` has the rows.
 const FLOAT_X: [f32; 16] = as_floats(LANE_X);
 const FLOAT_Y: [f32; 16] = as_floats(LANE_Y);
 
@@ -289,7 +290,7 @@ const fn as_floats(of: [i32; 16]) -> [f32; 16] {
     out
 }
 
-/// `dx x + dy y` of the lanes of a block.
+/// The values of `dx x + dy y` for the lanes of a block.
 #[inline(always)]
 fn lane_offsets<S: Simd>(simd: S, dx: f32, dy: f32) -> [f32; 16] {
     let x = f32x16::simd_from(simd, FLOAT_X);
@@ -298,7 +299,7 @@ fn lane_offsets<S: Simd>(simd: S, dx: f32, dy: f32) -> [f32; 16] {
 }
 
 impl Edge {
-    /// The edge from `p` to `q`, both in 1/256 pixels; the polygon is to the right of it (clockwise, y down).
+    /// The edge from `p` to `q`, both in 1/256 pixels. The polygon is to the right of it (clockwise, y down).
     #[inline(always)]
     fn new<S: Simd>(simd: S, p: [i64; 2], q: [i64; 2], positions: &[[i32; 2]]) -> Self {
         let [dx, dy] = [q[0] - p[0], q[1] - p[1]];
@@ -321,12 +322,12 @@ impl Edge {
     }
 }
 
-/// What fragments need of their primitive's planes.
+/// The interpolated values that fragments need.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Needs {
     pub barycentrics: bool,
-    /// After the early tests.
+    /// True if depth is needed after the early tests.
     pub depth: bool,
-    /// 1 / w.
+    /// True if 1 / w is needed.
     pub inverse_w: bool,
 }

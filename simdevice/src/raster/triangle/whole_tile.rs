@@ -1,6 +1,6 @@
-//! Tiles that one primitive covers as a whole, in draws that test nothing after shading. They wait to be shaded where a
-//! later primitive of the draw may overwrite them: then the earlier one is never shaded there. Where fragments take nothing
-//! but varyings they are a batch that needs no list of quads.
+//! Tiles that one primitive covers completely, in draws without tests after shading. If a later primitive of the draw
+//! may overwrite such a tile, it is deferred, and the earlier primitive is then never shaded there. If the only inputs
+//! of fragments are varyings, the tile is a batch that needs no list of quads.
 
 use super::batch::{BlockValues, LANES, divided, varying};
 use super::setup::{Needs, TriangleSetup};
@@ -15,12 +15,12 @@ use isa::machine::LaneMask;
 // A tile fills the largest batch.
 const _: () = assert!(AREA == LANES);
 
-/// What the fragments of a tile get.
+/// The inputs of the fragments of a tile.
 #[derive(Debug)]
 pub struct FullTile {
-    /// The barycentrics of corners 1 and 2, pixel by pixel.
+    /// The linear barycentrics of corners 1 and 2, pixel by pixel.
     pub(super) linear: [[f32; AREA]; 2],
-    /// The same, perspective-correct.
+    /// The perspective-correct barycentrics.
     pub(super) perspective: [[f32; AREA]; 2],
     pub(super) attributes: Vec<[f32; 3]>,
     pub(super) all: LaneMask,
@@ -40,7 +40,7 @@ impl Default for FullTile {
 }
 
 impl FullTile {
-    /// Finds the barycentrics of all pixels; perspective-correct ones, too, if 1 / w is needed.
+    /// Computes the barycentrics of all pixels. If `needs.inverse_w`, it computes perspective-correct ones, too.
     #[inline(always)]
     pub(super) fn find_barycentrics<S: Simd>(
         &mut self,
@@ -64,7 +64,7 @@ impl FullTile {
         }
     }
 
-    /// A varying of all pixels.
+    /// Interpolates a varying for all pixels.
     #[inline(always)]
     pub(super) fn interpolate<S: Simd>(
         &self,
@@ -89,26 +89,26 @@ impl FullTile {
     }
 }
 
-/// Tiles of the largest macro-tile.
+/// The number of tiles of the largest macro-tile.
 const MAX_TILES: usize = (MAX_MACRO_TILE_SIZE / TILE_SIZE).pow(2) as usize;
 
-/// A primitive that tiles wait for.
+/// A primitive for which tiles are deferred.
 #[derive(Debug)]
 pub struct DeferredPrimitive {
     pub setup: TriangleSetup,
-    /// Its segment among the draw's, and its place there.
+    /// The number of its segment in the draw; `primitive` is its number in the segment.
     pub segment: usize,
     pub primitive: u32,
-    /// How many tiles wait for it.
+    /// The number of tiles that are deferred for it.
     tiles: u32,
 }
 
-/// The tiles of a macro-tile that wait.
+/// The deferred tiles of a macro-tile.
 #[derive(Debug)]
 pub struct DeferredTiles {
-    /// Which of `primitives` each waits for.
+    /// The index in `primitives` for each tile that is deferred.
     tiles: [Option<u8>; MAX_TILES],
-    /// As many as there are tiles, at most, since those that no tile waits for are replaced.
+    /// The primitives. There are at most as many as tiles, since those without tiles are replaced.
     primitives: Vec<DeferredPrimitive>,
 }
 
@@ -122,13 +122,13 @@ impl Default for DeferredTiles {
 }
 
 impl DeferredTiles {
-    /// Forgets everything.
+    /// Removes all tiles and primitives.
     pub fn clear(&mut self) {
         self.tiles = [None; MAX_TILES];
         self.primitives.clear();
     }
 
-    /// Adds a primitive, for which [`DeferredTiles::defer`] must be called next; returns where.
+    /// Adds a primitive and returns its slot. [`DeferredTiles::defer`] must be called for it next.
     #[cold]
     pub fn add(&mut self, setup: &TriangleSetup, segment: usize, primitive: u32) -> u8 {
         let deferred = DeferredPrimitive {
@@ -154,7 +154,7 @@ impl DeferredTiles {
         slot as u8
     }
 
-    /// Lets a tile wait for the primitive at a place. Tells whether it waited for another.
+    /// Defers a tile for the primitive in a slot. Returns true if it was deferred for another.
     pub fn defer(&mut self, tile: usize, slot: u8) -> bool {
         self.primitives[usize::from(slot)].tiles += 1;
         let before = self.tiles[tile].replace(slot);
@@ -164,12 +164,12 @@ impl DeferredTiles {
         before.is_some()
     }
 
-    /// Tells whether a tile waits.
+    /// True if a tile is deferred.
     pub fn is_deferred(&self, tile: usize) -> bool {
         self.tiles[tile].is_some()
     }
 
-    /// The primitive that a tile waited for, if any: it waits no more.
+    /// Takes the primitive for which a tile is deferred, if there is one. The tile is then no longer deferred.
     pub fn take(&mut self, tile: usize) -> Option<&DeferredPrimitive> {
         let slot = usize::from(self.tiles[tile].take()?);
         self.primitives[slot].tiles -= 1;
@@ -186,7 +186,7 @@ mod tests {
         let mut deferred = DeferredTiles::default();
         let setup = TriangleSetup::default();
         for round in 0..1000u32 {
-            // Each primitive covers a few tiles, of which later ones take some.
+            // Each primitive covers a few tiles, and later ones replace it in some.
             let slot = deferred.add(&setup, 0, round);
             for tile in 0..5 {
                 let tile = (round as usize * 7 + tile * 3) % MAX_TILES;

@@ -1,4 +1,4 @@
-//! What becomes of shaded fragments: coverage that the program takes away, late tests, and the colour attachments.
+//! The output of shaded fragments: removal of samples, late tests, and writes to the colour attachments.
 
 use super::batch::{Batch, offset};
 use super::draw::{Path, TriangleTileDraw};
@@ -11,7 +11,7 @@ use crate::simd::as_floats;
 use fearless_simd::{Simd, f32x16, prelude::*, u32x16};
 use isa::machine::{LaneMask, Machine};
 
-/// Tests depth and stencil of 16 samples; returns the lanes that pass.
+/// Runs the depth and stencil tests of 16 samples, updates the buffers, and returns the lanes that pass.
 #[inline(always)]
 pub fn test<S: Simd>(
     simd: S,
@@ -35,7 +35,7 @@ pub fn test<S: Simd>(
     }
     let passed = tests.test(simd, lanes, front, code, &mut depths, &mut stencils);
     if passed != 0 && tests.depth.is_some_and(|(_, write)| write) {
-        // Those that did not pass are as they were.
+        // Lanes that did not pass are unchanged.
         let stored = if quads.consecutive { u16::MAX } else { passed };
         quads.store(buffers.depth.words_mut(), stored, &depths);
         for tile in quads.tiles(buffers.depth.samples()) {
@@ -51,7 +51,8 @@ pub fn test<S: Simd>(
     passed
 }
 
-/// Takes a batch's results to the attachments, in order; returns how many samples passed if they are counted here.
+/// Writes a batch's results to the attachments, in order. Returns the number of samples that passed, if they are
+/// counted after shading, and 0 otherwise.
 #[inline(always)]
 pub fn write<S: Simd>(
     simd: S,
@@ -76,7 +77,8 @@ pub fn write<S: Simd>(
     for chunk in 0..batch.chunks() {
         let killed = killed.words().get(chunk / 4).copied().unwrap_or(0) >> (16 * (chunk % 4));
         let alive = !(killed as u16);
-        // Quads that cover the same sample take turns; so do those that may face differently in a stencil test.
+        // Quads that cover the same sample are processed one after another, and so are quads that may have different
+        // faces in a stencil test.
         let in_turn = batch.overlaps(chunk) || late && draw.tests.stencil.is_some();
         let turns: &[u16] = if in_turn {
             &[0xF, 0xF0, 0xF00, 0xF000]
@@ -110,7 +112,7 @@ pub fn write<S: Simd>(
     if draw.counts_late { passed } else { 0 }
 }
 
-/// As [`write`], for draws of which nothing is removed or tested after shading.
+/// Writes a batch's results as [`write`] does, for draws without removal of samples or tests after shading.
 #[inline(always)]
 fn write_directly<S: Simd>(
     simd: S,
@@ -132,7 +134,7 @@ fn write_directly<S: Simd>(
             let source = load(simd, &sources[0], chunk);
             let covered = Covered::of(batch, chunk);
             if let Some(packed) = output.replacement(simd, &source) {
-                // Quads are stored in order, so that the last of those at a place stays.
+                // Quads are stored in order, so that the last one with an address remains.
                 for sample in 0..count {
                     let lanes = covered.lanes(sample);
                     let quads = batch.places(chunk, sample, count);
@@ -162,7 +164,7 @@ fn write_directly<S: Simd>(
     }
 }
 
-/// What a chunk's quads cover: [`Quad::cover`](super::batch::Quad::cover) of each, from the lowest bits on.
+/// The coverage of a chunk's quads: [`Quad::cover`](super::batch::Quad::cover) of each, from the lowest bits on.
 struct Covered(u64);
 
 impl Covered {
@@ -173,7 +175,7 @@ impl Covered {
         Self(at(a.cover, 0) | at(b.cover, 1) | at(c.cover, 2) | at(d.cover, 3))
     }
 
-    /// The lanes of which a sample is covered.
+    /// The lanes for which a sample is covered.
     #[inline(always)]
     fn lanes(&self, sample: usize) -> u16 {
         let nibbles = self.0 >> (4 * sample) & 0x000F_000F_000F_000F;
@@ -181,7 +183,7 @@ impl Covered {
     }
 }
 
-/// The lanes of a chunk covered, by sample.
+/// The covered lanes of a chunk, by sample, restricted to the lanes `among`.
 #[inline(always)]
 fn sample_lanes(batch: &Batch, chunk: usize, among: u16) -> [u16; 4] {
     let covered = Covered::of(batch, chunk);
@@ -192,7 +194,7 @@ fn sample_lanes(batch: &Batch, chunk: usize, among: u16) -> [u16; 4] {
     samples
 }
 
-/// Takes away the samples that alpha and the program's sample mask do not cover.
+/// Removes the samples that alpha to coverage and the program's sample mask do not cover.
 #[inline(always)]
 fn remove<S: Simd>(
     simd: S,
@@ -225,7 +227,7 @@ fn remove<S: Simd>(
     }
 }
 
-/// The depths of a chunk's samples as the attachment holds them.
+/// The depths of a chunk's samples in the encoding of the attachment.
 #[inline(always)]
 fn late_depth<S: Simd>(
     simd: S,
@@ -243,7 +245,7 @@ fn late_depth<S: Simd>(
         Some(depth) => as_floats(simd, depth),
         None => {
             let mut depth = f32x16::from_slice(simd, &batch.depth[16 * chunk..][..16]);
-            // Samples shaded for themselves have their own depth already.
+            // In per-sample shading, depths are already those of the samples.
             if draw.samples.positions.len() > 1 && !draw.samples.each_shaded {
                 let [x, y] = draw.samples.positions[sample].map(offset);
                 let mut offsets = [0.0; 16];

@@ -1,11 +1,12 @@
-//! 16 lanes at once and lane by lane give the same bits, at every SIMD level, whatever the request.
+//! Tests that filtering 16 lanes at once and lane by lane gives the same bits, at every SIMD level and for random
+//! requests.
 
 use super::*;
 use rand::seq::IndexedRandom;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Coordinates that are ordinary, on edges, far away, or not numbers at all.
+/// A random coordinate: ordinary, on an edge, far away, or NaN.
 fn coordinate(rng: &mut ChaCha8Rng) -> f32 {
     match rng.random_range(0..10) {
         0 => rng.random_range(-4i32..5) as f32 / 4.0,
@@ -184,7 +185,7 @@ fn at_once_or_one_by_one_is_the_same() {
     }
 }
 
-/// Coordinates of four quads of a surface: anywhere, turned, near or far, or all of them odd.
+/// The coordinates of four quads on a surface: anywhere, rotated, near or far. In some cases all are special values.
 fn surface_coordinates(rng: &mut ChaCha8Rng) -> Vec<[f32; 4]> {
     let mut at = Vec::new();
     let odd = rng.random_range(0..4) == 0;

@@ -1,4 +1,4 @@
-//! Samples: mips, cubes, comparisons, gathers, borders, layers.
+//! Tests of samples: mips, cubes, comparisons, gathers, borders, layers.
 
 use super::*;
 
@@ -80,7 +80,7 @@ fn a_gather_begins_lower_left_and_goes_round() {
         |_, _, [x, y, _]| [x + 10 * y, 100 + x, 2, 3].map(f32::from_bits),
     );
     let table = table(image, Sampler::default());
-    // Between texels (1, 1), (2, 1), (1, 2) and (2, 2).
+    // The coordinates are between texels (1, 1), (2, 1), (1, 2) and (2, 2).
     let mut request = request(Dimension::D2, &[[0.5, 0.5, 0.0, 0.0]]);
     request.gather = Some(0);
     let one = |answer: [LaneWords; 4]| answer.map(|lanes| lanes[0]);
@@ -192,7 +192,7 @@ fn layers_are_rounded_to_even_and_clamped() {
     assert_eq!(found, [0.0, 0.0, 1.0, 2.0, 2.0, 3.0, 3.0, 0.0, 0.0]);
 }
 
-/// A cube whose texels are a smooth function of their direction.
+/// A cube whose texels are a smooth function of the direction.
 fn smooth_cube(size: u32) -> SampledImage {
     let desc = ImageDesc {
         array_layers: 6,
@@ -218,7 +218,7 @@ fn cubes_are_smooth_across_edges_and_corners() {
     let table = table(smooth_cube(16), filtered(Filter::Linear));
     let mut at = Vec::new();
     for step in 0..=1600 {
-        // A way over edges and close by a corner.
+        // The path crosses edges and passes near a corner.
         let angle = step as f32 / 1600.0 * std::f32::consts::TAU;
         at.push([angle.cos(), angle.sin(), angle.sin() * 0.97 + 0.01, 0.0]);
     }

@@ -1,4 +1,4 @@
-//! Tests of the image unit: small images whose every texel is known.
+//! Tests of the image unit with small images of known texels.
 
 mod agreement;
 mod filtering;
@@ -36,7 +36,7 @@ fn desc(kind: ImageKind, format: Format, extent: [u32; 3]) -> ImageDesc {
     }
 }
 
-/// An image whose texel at `(level, layer, [x, y, z])` has these registers.
+/// An image whose texel at `(level, layer, [x, y, z])` has these components.
 fn image(desc: ImageDesc, texel: impl Fn(u32, u32, [u32; 3]) -> [f32; 4]) -> SampledImage {
     let memory = Allocation::new_zeroed(desc.memory_size().unwrap()).unwrap();
     let image = Image::new(desc, memory, 0).unwrap();
@@ -68,13 +68,13 @@ fn image(desc: ImageDesc, texel: impl Fn(u32, u32, [u32; 3]) -> [f32; 4]) -> Sam
     }
 }
 
-/// A table of one sampled image and one sampler, at the best level.
+/// A table of one sampled image and one sampler, at the best SIMD level.
 fn table(image: SampledImage, sampler: Sampler) -> ImageTable {
     let level = SimdLevel::Best.resolve().unwrap();
     ImageTable::new(level, [ImageBinding::Sampled(image)], [Some(sampler)])
 }
 
-/// A sample at level 0 of lanes whose coordinates these are; the last repeats.
+/// A sample at level 0 with these coordinates, lane by lane. The last one repeats.
 fn request(dimension: Dimension, coordinates: &[[f32; 4]]) -> SampleRequest {
     let at = |lane: usize| coordinates[lane.min(coordinates.len() - 1)];
     SampleRequest {
@@ -88,12 +88,12 @@ fn request(dimension: Dimension, coordinates: &[[f32; 4]]) -> SampleRequest {
     }
 }
 
-/// One lane of an answer as floats.
+/// The components of one lane of a result, as floats.
 fn floats(answer: &[LaneWords; 4], lane: usize) -> [f32; 4] {
     answer.map(|lanes| f32::from_bits(lanes[lane]))
 }
 
-/// A filter within levels.
+/// A sampler with this filter within levels.
 fn filtered(filter: Filter) -> Sampler {
     Sampler {
         mag_filter: filter,
@@ -102,7 +102,7 @@ fn filtered(filter: Filter) -> Sampler {
     }
 }
 
-/// Every address mode.
+/// All address modes.
 const MODES: [AddressMode; 5] = [
     AddressMode::Repeat,
     AddressMode::MirroredRepeat,

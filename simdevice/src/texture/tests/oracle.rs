@@ -1,17 +1,17 @@
-//! Filters and levels of detail against the specification's formulas, taken literally, in binary64.
+//! Tests of filters and levels of detail against the specification's formulas in binary64.
 
 use super::super::addressing;
 use super::*;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// The wrapping operation by walking: from inside the image, a step at a time.
+/// The wrapping operation, in steps of one period or texel until the index is in the image.
 fn walk(mode: AddressMode, i: i32, size: i32) -> Option<u32> {
     let mut at = i;
     while !(0..size).contains(&at) {
         at = match mode {
             AddressMode::Repeat => at + if at < 0 { size } else { -size },
-            // Reflected at the edge that it lies beyond.
+            // The index is reflected at the edge beyond which it lies.
             AddressMode::MirroredRepeat if at < 0 => -1 - at,
             AddressMode::MirroredRepeat => 2 * size - 1 - at,
             AddressMode::ClampToEdge => at + if at < 0 { 1 } else { -1 },
@@ -38,7 +38,7 @@ fn indices_wrap_as_specified() {
     }
 }
 
-/// The two indices and the second's weight, by the formulas.
+/// The indices of both texels and the weight of the second, by the formulas.
 fn linear(mode: AddressMode, s: f64, size: i32, offset: i32) -> ([Option<u32>; 2], f64) {
     let u = s * f64::from(size) + f64::from(offset) - 0.5;
     let first = u.floor() as i32;

@@ -1,10 +1,10 @@
-//! Fetches, storage images, texel buffers and queries.
+//! Tests of fetches, storage images, texel buffers and queries.
 
 use super::*;
 use crate::packet::BufferRange;
 use isa::ir::AtomicOp;
 
-/// An access of lanes at these coordinates; the last repeats, but only lanes that are given take part.
+/// An access at these coordinates, lane by lane. Only as many lanes as coordinates are active.
 fn texels(shape: ImageShape, coordinates: &[[u32; 4]]) -> TexelRequest {
     let at = |lane: usize| coordinates[lane.min(coordinates.len() - 1)];
     TexelRequest {
@@ -58,7 +58,7 @@ fn fetches_reach_levels_layers_and_samples_within_bounds() {
     let found: [[u32; 4]; 7] = std::array::from_fn(|lane| answer.map(|lanes| lanes[lane]));
     assert_eq!(found[0], [23, 1, 0, 1]);
     assert_eq!(found[1], [11, 102, 0, 1]);
-    // What the format lacks is as ever: zeros, and an alpha of 1.
+    // Components that the format lacks are zeros, and an alpha of 1.
     assert_eq!(found[2..], [[0, 0, 0, 1]; 5], "outside");
 }
 

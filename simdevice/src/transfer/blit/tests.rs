@@ -1,4 +1,4 @@
-//! Blits against the specification's formulas, texel by texel in binary64.
+//! Tests of blits against the specification's formulas, texel by texel in binary64.
 
 use super::*;
 use crate::image::{ImageDesc, ImageKind};
@@ -29,7 +29,7 @@ fn layers(aspect: Aspect, layer_count: u32) -> SubresourceLayers {
     }
 }
 
-/// Sets every byte to what a generator gives.
+/// Sets all bytes to pseudo-random values.
 fn scramble(image: &Image, seed: u32) {
     let mut state = seed | 1;
     let bytes: Vec<u8> = (0..image.memory.len())
@@ -62,13 +62,13 @@ fn blit(source: &Arc<Image>, target: &Arc<Image>, filter: Filter, region: ImageB
     });
 }
 
-/// Where the centre of texel `i` of the target lies in the source: "Image Copies With Scaling".
+/// The position in the source of the centre of the target's texel `i` ("Image Copies With Scaling").
 fn place(from: [i32; 2], to: [i32; 2], i: u32) -> f64 {
     let scale = f64::from(from[1] - from[0]) / f64::from(to[1] - to[0]);
     (f64::from(i) + 0.5 - f64::from(to[0])) * scale + f64::from(from[0])
 }
 
-/// The weighted mean of the eight texels around a place.
+/// The weighted mean of the eight texels around a position.
 fn linear(image: &Image, layer: u32, place: [f64; 3]) -> [f64; 4] {
     let mut sum = [0.0; 4];
     for corner in 0..8 {
@@ -166,7 +166,7 @@ proptest! {
                 let [first, last] = [to[axis][0].min(to[axis][1]), to[axis][0].max(to[axis][1])];
                 (first..last).contains(&at[axis].cast_signed())
             });
-            // Away from edges between texels, where binary64 may round to either side.
+            // Positions at edges between texels are skipped, because binary64 may round to either side.
             let places = [0, 1].map(|axis| place(from[axis], to[axis], at[axis]));
             if inside && places.iter().any(|place| (place - place.round()).abs() < 1e-9) {
                 continue;
@@ -189,7 +189,7 @@ proptest! {
 
 #[test]
 fn a_centre_on_an_edge_between_texels_lies_in_the_second() {
-    // Halving the width: centres at 1, 3 and 5 of six texels.
+    // The width is halved: the centres are at 1, 3 and 5 of six texels.
     let source = image(ImageKind::D1, Format::R8Uint, [6, 1, 1], 1);
     let layout = source.subresource(Aspect::Color, 0, 0).unwrap();
     source
@@ -226,7 +226,7 @@ fn depth_and_stencil_keep_their_bits() {
     let (source, target) = (make(), make());
     scramble(&source, 77);
     for aspect in [Aspect::Depth, Aspect::Stencil] {
-        // Turned by half a turn; a linear filter means nothing to depth.
+        // The image is rotated by half a turn. A linear filter has no effect on depth.
         let region = ImageBlitRegion {
             source: layers(aspect, 1),
             source_corners: [[0, 0, 0], [5, 4, 1]],

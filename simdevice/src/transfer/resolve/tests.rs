@@ -68,7 +68,7 @@ fn a_region_of_each_layer_is_resolved() {
     let source = image(Format::R8G8B8A8Srgb, 4);
     let target = image(Format::R8G8B8A8Srgb, 1);
     let layout = source.subresource(Aspect::Color, 0, 1).unwrap();
-    // Black, black, white and white: in the middle of light, not of codes.
+    // The samples are black, black, white and white. Their mean is that of linear values, not of codes.
     for sample in 2..4 {
         let row = [255; 16];
         for y in 0..3 {

@@ -8,7 +8,7 @@ use isa::level::SimdLevel;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// The framebuffer of these tests in pixels.
+/// The framebuffer's width and height in these tests, in pixels.
 const SIZE: i32 = 64;
 
 fn primitive(corners: [[i32; 2]; 3], kind: PrimitiveKind) -> Primitive {
@@ -27,7 +27,7 @@ fn primitive(corners: [[i32; 2]; 3], kind: PrimitiveKind) -> Primitive {
     }
 }
 
-/// The signed area of a triangle, twice.
+/// Twice the signed area of a triangle.
 fn area([a, b, c]: [[i32; 2]; 3]) -> i128 {
     let [a, b, c] = [a, b, c].map(|p| p.map(i128::from));
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
@@ -42,7 +42,7 @@ fn oriented([a, b, c]: [[i32; 2]; 3]) -> Option<[[i32; 2]; 3]> {
     }
 }
 
-/// Whether a sample (in 1/256 pixels) is covered, by the rule's words: inside, or on a left or top edge.
+/// True if a sample (in 1/256 pixels) is covered by the specification's rule: inside, or on a left or top edge.
 pub(in crate::raster) fn covers(primitive: &Primitive, sample: [i64; 2]) -> bool {
     let [p0, p1, p2] = primitive.corners.map(|p| p.map(i128::from));
     let mut corners = vec![p0, p1, p2];
@@ -59,7 +59,7 @@ pub(in crate::raster) fn covers(primitive: &Primitive, sample: [i64; 2]) -> bool
     })
 }
 
-/// The samples that the fast way covers of the framebuffer, within `clip`.
+/// The samples of the framebuffer that [`Coverage`] finds, within `clip`.
 fn fast<const N: usize>(
     level: Level,
     primitive: &Primitive,
@@ -99,7 +99,7 @@ const EVERYTHING: Rect = Rect {
     height: SIZE as u32,
 };
 
-/// Compares both ways over all samples; returns how many are covered.
+/// Compares both ways for all samples, and returns the number of covered samples.
 fn compare<const N: usize>(
     level: Level,
     primitive: &Primitive,
@@ -128,7 +128,7 @@ fn compare<const N: usize>(
     count
 }
 
-/// Triangles of every kind: tiny, slivers, large, huge, on the grid of centres, off screen.
+/// Random triangles: tiny, slivers, large, huge, on the grid of pixel centres, or off screen.
 fn corners(rng: &mut ChaCha8Rng) -> [[i32; 2]; 3] {
     let kind = rng.random_range(0..7);
     let spread = match kind {

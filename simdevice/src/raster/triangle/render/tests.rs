@@ -1,4 +1,4 @@
-//! Whole passes against a naive twin: each sample for itself, each primitive in order.
+//! Tests of whole passes against a naive reference that processes each sample by itself, and each primitive in order.
 
 mod special;
 mod twin;
@@ -32,7 +32,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::sync::Arc;
 
-/// The framebuffer: no side is a multiple of a tile's.
+/// The framebuffer's width. Neither it nor the height is a multiple of a tile's side.
 const WIDTH: u32 = 90;
 const HEIGHT: u32 = 70;
 const EVERYTHING: Rect = Rect {
@@ -89,8 +89,8 @@ fn state(samples: u32) -> DrawState {
     }
 }
 
-/// A fragment stage whose inputs and outputs are as given, slot by slot: each output is an input. Lanes are killed
-/// where the input after the last output is above one half, if `discards`.
+/// A fragment stage with these inputs and outputs, slot by slot, that copies inputs to outputs. If `discards`, lanes
+/// are killed where the input after the last output is above one half.
 fn fragments(
     inputs: Vec<FragmentInput>,
     outputs: Vec<FragmentOutput>,
@@ -122,7 +122,7 @@ fn fragments(
     }
 }
 
-/// Varyings 0 to `count`.
+/// The varyings from 0 to `count` as inputs.
 fn varyings(count: u32, interpolation: Interpolation, sampling: Sampling) -> Vec<FragmentInput> {
     (0..count)
         .map(|index| FragmentInput::Varying {
@@ -133,7 +133,7 @@ fn varyings(count: u32, interpolation: Interpolation, sampling: Sampling) -> Vec
         .collect()
 }
 
-/// The components of a colour attachment.
+/// The components of a colour attachment as outputs.
 fn color(attachment: usize, index: usize) -> Vec<FragmentOutput> {
     (0..4)
         .map(|component| FragmentOutput::Color {
@@ -148,7 +148,7 @@ fn vertex_program() -> Program {
     Builder::new().finish().unwrap()
 }
 
-/// A draw by hand: three vertices to each primitive, each with `per_vertex` varyings.
+/// A draw of these primitives, with three vertices each and `per_vertex` varyings per vertex.
 fn draw(
     device: &Device,
     fragment: Option<FragmentPrograms>,
@@ -192,7 +192,7 @@ fn draw(
     }
 }
 
-/// A triangle of random corners around the framebuffer, at a constant depth.
+/// A triangle with random corners around the framebuffer and a constant depth.
 fn triangle(rng: &mut ChaCha8Rng, index: u32) -> Primitive {
     let spread = *[600, 4000, 30_000].choose(rng).unwrap();
     let (w, h) = (WIDTH as i32 * 256, HEIGHT as i32 * 256);
@@ -205,7 +205,7 @@ fn triangle(rng: &mut ChaCha8Rng, index: u32) -> Primitive {
         if (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) <= 0 {
             continue;
         }
-        // Few depths, so that they are often equal.
+        // There are few depths, so that they are often equal.
         let depth = rng.random_range(0..8) as f32 / 7.0;
         return Primitive {
             corners,
@@ -223,7 +223,7 @@ fn triangle(rng: &mut ChaCha8Rng, index: u32) -> Primitive {
     }
 }
 
-/// Runs draws as one pass; returns what was counted.
+/// Runs draws as one pass, and returns the counters.
 fn run(
     config: &Config,
     rendering: &Rendering,
@@ -244,7 +244,7 @@ fn run(
     counters
 }
 
-/// Ways to go about a pass that must not matter.
+/// The configurations that must all give the same result.
 fn configs() -> Vec<Config> {
     let base = Config {
         threads: 1,
@@ -278,8 +278,8 @@ fn interpolation_agrees_with_binary64() {
     }
 }
 
-/// One large triangle in perspective: every varying, depth and 1 / w against binary64, at the pixels' centres or at the
-/// samples.
+/// Compares every varying, depth and 1 / w of a large triangle in perspective with binary64, at the pixels' centres or
+/// at the samples.
 fn interpolate(samples: u32, each_shaded: bool, simd: SimdLevel) {
     let config = Config {
         threads: 1,

@@ -1,4 +1,5 @@
-//! What random states do not reach: samples, layers, resolves, side effects, programs that do not end.
+//! Tests of features that random states do not cover: samples, layers, resolves, side effects, programs that do not
+//! end.
 
 use super::*;
 use crate::packet::{Attachment, BufferRange, Rendering};
@@ -13,7 +14,7 @@ fn single() -> Config {
     }
 }
 
-/// A triangle over corners in 1/256 pixels, clockwise on the screen.
+/// A triangle with these corners in 1/256 pixels, clockwise in the framebuffer.
 fn over(corners: [[i32; 2]; 3], layer: u16) -> Primitive {
     Primitive {
         corners,
@@ -30,7 +31,7 @@ fn over(corners: [[i32; 2]; 3], layer: u16) -> Primitive {
     }
 }
 
-/// Covers the framebuffer.
+/// The corners of a triangle that covers the framebuffer.
 const LARGE: [[i32; 2]; 3] = [[-100, -100], [60_000, -100], [-100, 60_000]];
 
 fn rendering(color: Vec<Attachment>) -> Rendering {
@@ -91,7 +92,8 @@ fn each_sample_is_shaded_for_itself() {
 #[test]
 fn centroids_lie_within_the_primitive() {
     let target = image(WIDE, 4, 1);
-    // Half a pixel wide, between the edge of pixels and their centres: those lie outside, where the varying is above 1.
+    // Half a pixel wide, between the edge of pixels and their centres. The centres are outside, where the varying is
+    // above 1.
     let corners = [[1020, 10], [1150, 10], [1020, 15_000]];
     let varying = |sampling| FragmentInput::Varying {
         index: 0,

@@ -1,4 +1,4 @@
-//! Random states against the twin.
+//! Tests of random states against the naive reference.
 
 use super::*;
 use crate::packet::Rendering;
@@ -95,8 +95,8 @@ struct Scene {
     draws: Vec<SceneDraw>,
 }
 
-/// A draw of it. Each primitive has ten varyings at its provoking vertex: two colours, what kills it above 0.5, and a
-/// depth.
+/// A draw of a scene. Each primitive has ten varyings at its provoking vertex: two colours, a value that kills it if
+/// above 0.5, and a depth.
 struct SceneDraw {
     state: DrawState,
     primitives: Vec<Primitive>,
@@ -212,7 +212,8 @@ fn scene(rng: &mut ChaCha8Rng) -> Scene {
     }
 }
 
-/// What images hold: bytes of colours, codes of depths, stencils, by sample of each pixel; and samples that passed.
+/// The content of the images by pixel and sample (bytes of colours, encoded depths, stencils), and the number of
+/// samples that passed.
 #[derive(Debug, PartialEq)]
 struct Picture {
     color: Vec<Vec<u8>>,
@@ -229,7 +230,7 @@ fn color_clear(scene: &Scene) -> ClearValue {
     }
 }
 
-/// The number that a depth format holds of a depth in 0 to 1.
+/// The encoding of a depth from 0 to 1 in a depth format.
 fn depth_code(format: Format, depth: f32) -> u32 {
     match format {
         Format::D16Unorm => (f64::from(depth) * 65_535.0).round_ties_even() as u32,
@@ -240,7 +241,7 @@ fn depth_code(format: Format, depth: f32) -> u32 {
     }
 }
 
-/// The scene, sample by sample.
+/// Renders the scene sample by sample.
 fn naive(scene: &Scene) -> Picture {
     let positions: &[[i32; 2]] = if scene.samples == 1 {
         &CENTER
@@ -309,7 +310,7 @@ fn naive(scene: &Scene) -> Picture {
     picture
 }
 
-/// One sample of a primitive.
+/// Processes one sample of a primitive.
 #[allow(clippy::too_many_arguments, reason = "a test's twin is spelled out")]
 fn fragment(
     scene: &Scene,
@@ -383,7 +384,7 @@ fn fragment(
     }
 }
 
-/// The colour of one sample.
+/// Blends the colour of one sample.
 fn blend(
     scene: &Scene,
     draw: &SceneDraw,
@@ -415,7 +416,7 @@ fn blend(
                 .zip(new)
                 .map(|(&d, s)| logic_byte(op, s, d))
                 .collect();
-            // -1 has two codes, of which this may give either.
+            // -1 has two encodings, and a logic operation may give either.
             if format == Format::R8G8B8A8Snorm {
                 for (byte, new) in bytes.into_iter().enumerate() {
                     if draw.state.blend[0].write_mask >> byte & 1 == 1 {
@@ -426,7 +427,7 @@ fn blend(
             }
             format.decode(&bytes)
         }
-        // Other formats take the source as it is.
+        // Other formats take the unchanged source.
         (None, Some(_)) => source,
         (None, None) => blender.blend_dual(source, second, destination),
     };
@@ -439,14 +440,14 @@ fn blend(
         }
     });
     for (byte, new) in format.encode(masked)[..stored.len()].iter().enumerate() {
-        // -1 has two codes, of which a component that is not written keeps its own.
+        // -1 has two encodings, and a component that is not written keeps its own.
         if format != Format::R8G8B8A8Snorm || mask >> byte & 1 == 1 {
             stored[byte] = *new;
         }
     }
 }
 
-/// A logic operation by its truth table: bit `2 s + d` of the entry.
+/// A logic operation by its truth table: the result is bit `2 s + d` of the operation's entry.
 fn logic_byte(op: LogicOp, s: u8, d: u8) -> u8 {
     const TABLE: [u8; 16] = [
         0b0000, 0b1000, 0b0100, 0b1100, 0b0010, 0b1010, 0b0110, 0b1110, 0b0001, 0b1001, 0b0101,
@@ -459,7 +460,7 @@ fn logic_byte(op: LogicOp, s: u8, d: u8) -> u8 {
     })
 }
 
-/// The scene on a device.
+/// Renders the scene on a device.
 fn render(scene: &Scene, config: &Config) -> Picture {
     let target = image(scene.color, scene.samples, 1);
     let depth = scene.depth.map(|format| image(format, scene.samples, 1));
