@@ -8,7 +8,7 @@ use thiserror::Error;
 use super::distance::{distance_between, distance_from_envelope, took_other_branch};
 use crate::oracle::Reference;
 
-/// Why a picture could not be written.
+/// An error of writing a picture.
 #[derive(Debug, Error)]
 pub enum PictureError {
     /// The folder could not be made.

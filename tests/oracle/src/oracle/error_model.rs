@@ -1,8 +1,7 @@
-//! How far an honest binary32 implementation may be from binary64.
+//! A bound on the distance of a correct binary32 implementation from binary64.
 //!
-//! The model serves one purpose: to tell which comparisons cannot be demanded of such an
-//! implementation. It is a first-order bound in the unit roundoff u = 2^-24, per Gaussian and
-//! pixel, and small where the Gaussian is well conditioned.
+//! The model tells which comparisons cannot be required of such an implementation. It is a first-order bound in the
+//! unit roundoff u = 2^-24, per Gaussian and pixel. It is small if the Gaussian is well conditioned.
 //!
 //! # Alpha
 //!
@@ -37,18 +36,18 @@
 /// Unit roundoff of binary32.
 pub const UNIT_ROUNDOFF: f64 = 1.0 / 16_777_216.0;
 
-/// Relative error of alpha in units of roundoff that every Gaussian is granted.
+/// Relative error of alpha, in units of roundoff, that is allowed for every Gaussian.
 pub const FIXED: f64 = 48.0;
 
-/// Roundings granted to the projected covariance and the quadratic form.
+/// Number of roundings allowed for the projected covariance and the quadratic form.
 pub const GEOMETRY: f64 = 8.0;
 
 /// The part of the model that belongs to one Gaussian.
 #[derive(Clone, Copy, Debug)]
 pub struct ErrorModel {
-    /// `b_0, b_1` of the module's text, in px.
+    /// `b_0, b_1` of the module's documentation, in px.
     spread: [f64; 2],
-    /// What doesn't change from pixel to pixel, in units of roundoff.
+    /// The part that is the same for all pixels, in units of roundoff.
     fixed: f64,
 }
 
@@ -91,18 +90,18 @@ impl ErrorModel {
 pub struct Transmittance {
     /// The binary64 value.
     pub value: f64,
-    /// How far a binary32 implementation may be from it.
+    /// The bound on the distance of a binary32 implementation from it.
     pub error: f64,
 }
 
 impl Transmittance {
-    /// Nothing in front yet.
+    /// The transmittance in front of the first Gaussian.
     pub const ONE: Self = Self {
         value: 1.0,
         error: 0.0,
     };
 
-    /// What is left behind a layer of `alpha`, itself known to within `alpha_error`.
+    /// The transmittance behind a layer of `alpha`, which is known to within `alpha_error`.
     pub fn behind(self, alpha: f64, alpha_error: f64) -> Self {
         let value = self.value * (1.0 - alpha);
         Self {

@@ -75,7 +75,7 @@ fn discs_that_cross_are_in_front_of_each_other() {
     ] {
         let picture = render(&crossing, &camera(), &state);
         let [left, right] = [31, 33].map(|x| at(&picture, x, 32));
-        // The first goes back on the left, where its x is negative: -x sin.
+        // The first goes behind the second on the left, where its x is negative: -x sin.
         assert!(
             left[1] > left[0] && right[0] > right[1],
             "{left:?} {right:?}"
