@@ -1,5 +1,6 @@
-//! Prints the module's table of `docs/simulator.md`: tiles drawn by Verilator beside the model's, and cycles by cause.
-//! `cargo run --profile checked -p gaurast-tests --example rtl -- FOLDER TILES [SCENE...]`; FOLDER keeps what is built.
+//! Prints the table of the SystemVerilog module in `docs/simulator.md`: tiles drawn by Verilator and by the model, and
+//! cycles by cause. `cargo run --profile checked -p gaurast-tests --example rtl -- FOLDER TILES [SCENE...]`; FOLDER
+//! keeps Verilator's build.
 
 #[path = "../simulator/tiles.rs"]
 #[allow(dead_code, reason = "the tests use more of it")]

@@ -1,5 +1,5 @@
-//! Who survives what: the stress scenes on this driver and as blended quads on lavapipe, each against the binary64
-//! oracle. `stress_table [FILE]` writes the table, by default to `tests/stress/TABLE.md`.
+//! Draws the stress scenes on this driver and as blended quads on lavapipe, and compares both with the binary64 oracle.
+//! `stress_table [FILE]` writes the table, by default to `tests/stress/TABLE.md`.
 
 use std::error::Error;
 use std::fmt::Write as _;
@@ -24,7 +24,7 @@ mod verdicts;
 use scenes::{Stress, all};
 use verdicts::draw;
 
-/// The device that quads are drawn on.
+/// The device on which quads are drawn.
 const PEER: &str = "llvmpipe";
 
 const HEAD: &str = "# Who survives what
@@ -53,7 +53,7 @@ no number; *fails* is no picture at all.
 |---|---:|{rules}---|---:|---:|---|---:|
 ";
 
-/// The scene as the peer takes it, if it can draw what is asked for.
+/// The scene for the peer, or `None` if the peer cannot draw it.
 fn for_quads(stress: &Stress) -> Option<(Scene, Camera)> {
     let (camera, state) = (&stress.camera, &stress.state);
     let default = scenes::State::default();
@@ -93,10 +93,10 @@ fn for_quads(stress: &Stress) -> Option<(Scene, Camera)> {
     plain.then_some((scene, camera))
 }
 
-/// Distances of a picture's pixels from what binary64 allows.
+/// Distances of a picture's pixels from the oracle's envelope.
 struct Distances {
     greatest: f64,
-    /// What 99.9 % of the pixels keep.
+    /// The 99.9th percentile of the pixels' distances.
     most: f64,
 }
 
