@@ -22,7 +22,7 @@ pub type Use = Box<dyn Fn() -> Vec<u8>>;
 
 /// The time at which a scenario's device is opened.
 pub enum Opened {
-    /// Before each use, so that only the use fails.
+    /// Once before all uses, so that all have the same device.
     Before,
     /// Each time that it is used.
     Within,
