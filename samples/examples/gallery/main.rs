@@ -16,7 +16,7 @@ use image::RgbImage;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use rooms::{Content, Exhibit};
 
-/// How two pictures differ: grey where they do not, `times` as much as they do.
+/// The difference of two pictures, multiplied by `times`; grey where they are equal.
 fn difference(a: &RgbImage, b: &RgbImage, times: f32) -> RgbImage {
     let mut picture = a.clone();
     for (a, b) in picture.iter_mut().zip(b.iter()) {

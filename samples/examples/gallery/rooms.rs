@@ -1,4 +1,4 @@
-//! What is shown beside what.
+//! The contents of the gallery's page: rooms of pictures that are compared.
 
 use ash::vk::SampleCountFlags as Samples;
 use gaurast::vk::{
@@ -13,15 +13,15 @@ use crate::scenes::{self, Scenes};
 
 const SIZE: [u32; 2] = [192, 120];
 
-/// What a picture shows.
+/// The contents of a picture.
 #[allow(clippy::large_enum_variant, reason = "there are some thirty of them")]
 pub enum Content<'a> {
     Drawn(Picture<'a>),
-    /// How the second of two differs from the first, so many times as much.
+    /// The difference of the second picture from the first, multiplied by the number.
     Difference([Picture<'a>; 2], f32),
 }
 
-/// A picture with its file's name and what is said about it.
+/// A picture with its file's name and its caption.
 pub struct Exhibit<'a> {
     pub name: &'a str,
     pub caption: &'a str,
@@ -52,7 +52,7 @@ pub fn all(scenes: &Scenes) -> Vec<Room<'_>> {
     ]
 }
 
-/// Looks along +z from the origin, with a focal length in pixels.
+/// A camera at the origin that looks along +z, with a focal length in pixels.
 fn camera(focal: f32) -> Camera<'static> {
     let [width, height] = SIZE.map(|side| side as f32);
     Camera::default()
@@ -79,7 +79,7 @@ fn picture(splats: &[Splat], focal: f32) -> Picture<'_> {
     }
 }
 
-/// A picture in another state.
+/// A picture with another state.
 fn with<'a>(
     picture: Picture<'a>,
     change: impl FnOnce(State<'static>) -> State<'static>,
@@ -340,7 +340,7 @@ fn limits(scenes: &Scenes) -> Room<'_> {
     }
 }
 
-/// A triangle across the picture, half as deep as the still life.
+/// A triangle across the picture, at half the depth of the still life.
 fn triangle() -> Option<Triangle> {
     let [c0, c1] = camera(1.0).depth_coefficients;
     Some(Triangle {
