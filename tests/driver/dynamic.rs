@@ -192,7 +192,7 @@ fn provoking(on: bool) -> vk::ProvokingVertexModeEXT {
     }
 }
 
-/// Chains a structure to a pipeline's rasterization state. It lives as long as the program.
+/// Chains a structure to a pipeline's rasterization state. It is never freed.
 fn chained<T: 'static>(options: &mut PipelineOptions<'_>, structure: T) {
     let leaked: &'static mut T = Box::leak(Box::new(structure));
     options.raster.p_next = std::ptr::from_mut(leaked).cast();

@@ -138,7 +138,7 @@ pub fn run(arguments: &ViewsArguments) -> Result<(), Error> {
     Ok(())
 }
 
-/// Pictures of one size beside and below each other.
+/// Pictures of one size in rows.
 struct Sheet {
     cell: [u32; 2],
     picture: Picture,

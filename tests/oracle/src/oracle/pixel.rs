@@ -220,7 +220,7 @@ impl Step<'_> {
         let behind = path
             .transmittance
             .behind(self.alpha.value, self.alpha.error);
-        // Where 1 - alpha rounds to 1, T doesn't change, and it has passed this test before.
+        // If 1 - alpha rounds to 1, T does not change, and it has passed this test before.
         let undecidable = floor > 0.0
             && self.alpha.value > 0.5 * UNIT_ROUNDOFF
             && (behind.value - floor).abs() < behind.error;

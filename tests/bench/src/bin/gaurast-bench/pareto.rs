@@ -92,7 +92,7 @@ pub(super) fn run(arguments: &ParetoArguments) -> Result<(), BenchError> {
             table(&scene).table()
         );
         results.scenes.push(scene);
-        // What is known so far is kept if a later scene fails.
+        // The results so far are kept if a later scene fails.
         save(&arguments.output, &results)?;
     }
     Ok(())
