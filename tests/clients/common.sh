@@ -1,5 +1,5 @@
-# Functions of the clients' scripts. Each script runs one third-party program on this driver, through the Vulkan loader. It
-# exits with 0 if the program worked, with 1 if it did not, and with 77 and the reason if it cannot run here.
+# Functions of the clients' scripts. Each script runs one third-party program on this driver, through the Vulkan loader.
+# It exits with 0 if the program worked, with 1 if it did not, and with 77 and the reason if it cannot run here.
 set -eu
 root=$(cd "$(dirname "$0")/../.." && pwd)
 out=${GAURAST_CLIENTS_OUT:-$(mktemp -d)}

@@ -11,7 +11,7 @@ struct Splat {
 };
 
 layout(std430, set = 0, binding = 0) readonly buffer Splats { Splat splats[]; };
-layout(push_constant) uniform Push { vec2 pixel; float floor_; }; // pixel: the size of a pixel in normalised device coordinates
+layout(push_constant) uniform Push { vec2 pixel; float floor_; }; // the size of a pixel in normalised device coordinates
 
 layout(location = 0) noperspective out vec2 offset;
 layout(location = 1) flat out vec4 color;
@@ -24,8 +24,8 @@ void main() {
     vec2 size = 2.0 / pixel;
     vec2 deviations, place;
     if (splat.radius * length(splat.major) > max(size.x, size.y)) {
-        // The quad is far larger than the picture, so the whole picture is drawn in its place: with corners so far away,
-        // some rasterizers interpolate badly.
+        // The quad is far larger than the picture, so the whole picture is drawn in its place: with corners so far
+        // away, some rasterizers interpolate badly.
         place = (corner * 0.5 + 0.5) * size;
         vec2 from = place - splat.mean;
         deviations = vec2(dot(from, splat.major) / dot(splat.major, splat.major),
