@@ -11,7 +11,7 @@ struct Splat {
 };
 
 layout(std430, set = 0, binding = 0) readonly buffer Splats { Splat splats[]; };
-layout(push_constant) uniform Push { vec2 pixel; float floor_; }; // the size of a pixel in normalised device coordinates
+layout(push_constant) uniform Push { vec2 pixel; float floor_; }; // pixel size in normalised device coordinates
 
 layout(location = 0) noperspective out vec2 offset;
 layout(location = 1) flat out vec4 color;
