@@ -18,7 +18,7 @@ fn main() -> std::io::Result<()> {
     };
     let count: usize = tiles.parse().map_err(std::io::Error::other)?;
     println!(
-        "| tiles | numbers | groups | tiles | pixels that differ | cycles | a pixel each | transmittance | memory | controller | modes |"
+        "| tiles | numbers | groups | count | differing pixels | cycles | busy | transmittance | memory | controller | modes |"
     );
     println!("|---|---|---|---:|---:|---:|---:|---:|---:|---:|---:|");
     let views: Vec<_> = scenes
