@@ -75,8 +75,8 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     println!("# Errors of binary16 rasterization\n");
     println!(
-        "Pictures of {}x{} pixels against the binary64 oracle, over (C, 1 - T); written by \
-         `tests/examples/binary16_error.rs`.\n",
+        "Pictures of {}x{} pixels, compared with the binary64 oracle in all channels of (C, 1 - T). \
+         `cargo run --release -p gaurast-tests --example binary16_error` prints this page.\n",
         SIZE[0], SIZE[1]
     );
     println!(

@@ -40,7 +40,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     std::fs::create_dir_all(&pictures)?;
     let scenes = scenes::Scenes::new();
     let gpu = Gpu::new()?;
-    let mut page = "# Gallery\n\nA picture of each mode; `cargo run --release --example gallery` draws them again.\n".to_owned();
+    let mut page = "# Gallery\n\nA picture of each mode. `cargo run --release -p gaurast-examples --example gallery` draws them and writes this page.\n".to_owned();
     for room in rooms::all(&scenes) {
         let (mut images, mut captions) = (String::new(), String::new());
         for Exhibit {
