@@ -1,7 +1,6 @@
 //! Draws a million Gaussians that each fill a target of 8192x8192 pixels: 2.6e11 pairs of tile and Gaussian, far more
 //! than a list can hold. `screen_fillers [COUNT [SIDE]]` draws them once and prints the time and the peak memory of the
 //! process.
-//! held at most.
 
 use gaurast::vk::GaussianCameraGAURAST;
 use gaurast_testkit::{

@@ -48,8 +48,8 @@ impl Device {
     /// the path of a manifest, which becomes the loader's only one; `loader` for the loader's first device that draws
     /// Gaussians; or a part of such a device's name.
     ///
+    /// # Errors
     /// If there is no such device, or Vulkan fails.
-    /// If there is none, or Vulkan fails.
     pub fn open(driver: &str) -> Result<Self, Error> {
         if driver == "embedded" {
             return Self::of(vulkan_gaurast::entry(), "");

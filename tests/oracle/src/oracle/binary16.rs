@@ -5,7 +5,6 @@
 //! from arithmetic whose last digits are free. An input that is close to the midpoint of two binary16 numbers may be
 //! rounded to either, and 2 to the power of the exponent is within [`OF_POWER`] units in the last place. The reference
 //! follows all possibilities. A pixel's envelope is their range, which is a single point nearly everywhere.
-//! followed; a pixel's envelope is what they reach, and it is a point nearly everywhere.
 
 use half::f16;
 use rayon::prelude::*;
