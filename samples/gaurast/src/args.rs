@@ -268,9 +268,8 @@ pub struct OutputArguments {
 
     /// The background of the scene: transparent, a name, #rgb, #rrggbb, or R,G,B, each 0 to 1
     ///
-    /// The scene is composited over a colour: C + T background, with alpha 1. Without this option, EXR files hold (C, 1
-    /// - T), premultiplied, and the other files are opaque over black. Transparent PNG and WebP files have straight
-    /// alpha.
+    /// The scene is composited over a colour: C + T background, with alpha 1. By default, EXR files hold premultiplied
+    /// (C, 1 - T), and other files are opaque over black. Transparent PNG and WebP files have straight alpha.
     #[arg(long, value_name = "COLOUR", allow_hyphen_values = true)]
     pub background: Option<Background>,
 
