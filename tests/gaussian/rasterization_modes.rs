@@ -1,5 +1,5 @@
-//! The per-pixel order and 2D Gaussians against the binary64 oracle, at every SIMD level, with one worker thread and with
-//! two.
+//! The per-pixel order and 2D Gaussians against the binary64 oracle, at every SIMD level, with one worker thread and
+//! with two.
 
 use gaurast::vk::{
     GaussianCameraGAURAST, GaussianCameraModelGAURAST, GaussianGeometryGAURAST,

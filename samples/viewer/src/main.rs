@@ -1,4 +1,5 @@
-//! A window in which a camera flies around a scene of Gaussians with a mesh in it: plain `ash`, `winit`, and a swapchain.
+//! A window in which a camera flies around a scene of Gaussians with a mesh in it: plain `ash`, `winit`, and a
+//! swapchain.
 
 #![cfg_attr(rustfmt, rustfmt_skip)] // A step a line, so that a few screens show everything.
 

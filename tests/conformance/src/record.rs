@@ -95,7 +95,7 @@ pub fn record(device: &Device, draw: &Draw, stored: &Stored) -> Result<Picture, 
                         device.gaussian.cmd_end_gaussian_set(commands);
                         device.gaussian.cmd_begin_gaussian_set(commands);
                     }
-                    // Each call is a set of its own.
+                    // Each call is a separate set.
                     Call::EndSet => {}
                 }
             }

@@ -13,9 +13,9 @@ pub struct Gaussian<'a> {
     pub position: [f32; 3],
     /// Standard deviations along the Gaussian's own axes, in units of world space.
     pub scale: [f32; 3],
-    /// A quaternion, w first, that turns the Gaussian's own axes to those of the world.
+    /// A quaternion, w first, that rotates the Gaussian's own axes to those of the world.
     pub rotation: [f32; 4],
-    /// The greatest alpha, before the low-pass.
+    /// The greatest alpha, before compensation.
     pub opacity: f32,
     /// Coefficients of red, green and blue: at least (degree + 1)^2 of them.
     pub harmonics: &'a [[f32; 3]],
@@ -32,18 +32,18 @@ pub struct Camera {
     pub focal_length: [f32; 2],
     /// The principal point, in pixels from the upper left corner of the viewport's area.
     pub principal_point: [f32; 2],
-    /// Gaussians are drawn beyond this depth.
+    /// The near plane: Gaussians with a greater depth are drawn.
     pub near_plane: f32,
-    /// Gaussians are drawn before this depth; it may be infinite.
+    /// The far plane: Gaussians with a smaller depth are drawn. It may be infinite.
     pub far_plane: f32,
-    /// A depth is the first, plus the second divided by z.
+    /// The coefficients of the depth: the first, plus the second divided by z.
     pub depth_coefficients: [f32; 2],
 }
 
 /// The change of the opacity with the low-pass filter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Antialiasing {
-    /// None.
+    /// The opacity does not change.
     Dilate,
     /// The opacity decreases as the projected area increases.
     OpacityCompensated,

@@ -142,8 +142,8 @@ impl Opened {
             .enabled_layer_names(&layers)
             .enabled_extension_names(&extensions)
             .push_next(&mut messenger_info);
-        // SAFETY: the create infos are valid, what is created lives as long as the instance, and the messages outlive the
-        // messenger that writes to them.
+        // SAFETY: the create infos are valid, what is created lives as long as the instance, and the messages outlive
+        // the messenger that writes to them.
         unsafe {
             let instance = entry
                 .create_instance(&info, None)

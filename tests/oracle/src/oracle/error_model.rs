@@ -9,7 +9,7 @@
 //! `q = |y|^2` and `w = S^-1 d = L^-T y`. An error of the exponent `q / 2` is a relative error of
 //! alpha.
 //! - *M.* Row i is a product of the Jacobian's row `j_i`, two rotations and the scales, each
-//!   rounded; the rounding of a row of norm `|j_i|` is stretched by the scales, so
+//!   rounded; the rounding error of a row of norm `|j_i|` is multiplied by the scales, so
 //!   `|dm_i| <= c u |j_i| max(s)`. Since `dS = dM M^T + M dM^T`,
 //!   `|d(q/2)| = |(dM^T w) . (M^T w)| <= c u (sum_i |w_i| |j_i| max(s)) sqrt(q)`, for
 //!   `|M^T w|^2 <= w^T S w = q`.
@@ -19,19 +19,19 @@
 //! - *d.* Each component is rounded once, `|d_i| <= sqrt(S_ii) sqrt(q)`, and the mean's fraction
 //!   may be held in binary32, below one pixel: `|d(q/2)| <= u sum_i |w_i| (sqrt(S_ii) sqrt(q) + 1)`.
 //!
-//! With `b_i = sqrt((|j_i| max(s))^2 + lowPass) >= sqrt(S_ii)` they add up to
-//! `c u sum_i |w_i| (b_i sqrt(q) + 1)`, c = [`GEOMETRY`]. What remains doesn't depend on the
-//! geometry: rounding of the exponent (whose `q / 2` the sum above covers, being at least `q`), the
-//! exponential, and a few products, or a row recurrence of eight steps in place of the
-//! exponential: [`FIXED`] u = 2.9e-6. The exponent may have the opacity folded in:
-//! `2 u |log2 o|`. Opacity compensation multiplies by `|m0 x m1| / sqrt(det S)`, whose relative
-//! error is `c u b_0 b_1 / |m0 x m1|`.
+//! With `b_i = sqrt((|j_i| max(s))^2 + lowPass) >= sqrt(S_ii)` their sum is
+//! `c u sum_i |w_i| (b_i sqrt(q) + 1)`, c = [`GEOMETRY`]. The other errors do not depend on the
+//! geometry. The first is [`FIXED`] u = 2.9e-6, for the rounding of the exponent, the exponential, and
+//! a few products, or for a row recurrence of eight steps in place of the exponential. (The sum above
+//! is at least `q`, so it covers the rounding of `q / 2`.) The second is `2 u |log2 o|`, since the
+//! exponent may contain the logarithm of the opacity. Opacity compensation multiplies by `|m0 x m1| / sqrt(det S)`,
+//! whose relative error is `c u b_0 b_1 / |m0 x m1|`.
 //!
 //! # Transmittance
 //!
-//! `T' = T (1 - alpha)` is carried with an absolute error bound:
+//! `T' = T (1 - alpha)` has an absolute error bound:
 //! `E' = E (1 - alpha) + T (error of alpha) + 2 u T'`. It grows with the number of layers, and
-//! fast where alpha is near one. A clamped alpha has no error.
+//! fast if alpha is near one. A clamped alpha has no error.
 
 /// Unit roundoff of binary32.
 pub const UNIT_ROUNDOFF: f64 = 1.0 / 16_777_216.0;
@@ -52,7 +52,7 @@ pub struct ErrorModel {
 }
 
 impl ErrorModel {
-    /// `spread` is `b_0, b_1`; `area` is `|m0 x m1|` where opacity is compensated.
+    /// The model of a Gaussian: `spread` is `b_0, b_1`; `area` is `|m0 x m1|` if opacity is compensated.
     pub(super) fn new(spread: [f64; 2], opacity: f64, area: Option<f64>) -> Self {
         let folded = if opacity > 0.0 {
             2.0 * opacity.log2().abs()
@@ -66,7 +66,7 @@ impl ErrorModel {
         }
     }
 
-    /// Bound on the relative error of alpha, at most 1, where `w = S^-1 d` and `q = d . w`.
+    /// Bound on the relative error of alpha, at most 1, with `w = S^-1 d` and `q = d . w`.
     pub fn alpha(&self, w: [f64; 2], q: f64) -> f64 {
         let root = q.sqrt();
         let geometry =

@@ -1,9 +1,9 @@
 //! A Gaussian in its own axes: depth along a pixel's ray.
 //!
-//! A pixel's ray starts at `e + R^T o` and runs along `R^T r`. With `B = diag(1 / s') R(q)^T`, the standard deviations `s'`
-//! at least 2^-10 of the greatest (all 1 if that is 0), a Gaussian about `p` is greatest on the ray at
-//! `tau = (a . b) / (a . a)`, where `a = B R^T r` and `b = B (p - e - R^T o)`. Depths are compared after rounding to 36 bits
-//! of the significand, equal ones by the order of the draw.
+//! A pixel's ray starts at `e + R^T o` and runs along `R^T r`. With `B = diag(1 / s') R(q)^T`, the standard deviations
+//! `s'` at least 2^-10 of the greatest (all 1 if that is 0), a Gaussian about `p` is greatest on the ray at `tau = (a .
+//! b) / (a . a)`, where `a = B R^T r` and `b = B (p - e - R^T o)`. Depths are compared after rounding to 36 bits of the
+//! significand, equal ones by the order of the draw.
 
 use super::vectors::dot;
 use super::{OracleCamera, OracleModel};
@@ -11,7 +11,7 @@ use super::{OracleCamera, OracleModel};
 /// The least standard deviation as a share of the greatest.
 const LEAST_RATIO: f64 = 1.0 / 1024.0;
 
-/// Roundings of binary64 granted to `a` and `b`.
+/// Number of binary64 roundings allowed for `a` and `b`.
 const ROUNDINGS: f64 = 32.0;
 
 /// A Gaussian in its own axes, in standard deviations.

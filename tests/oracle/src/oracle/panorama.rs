@@ -6,8 +6,8 @@ use std::f64::consts::TAU;
 /// The cosine of the latitude beyond which the Jacobian no longer grows.
 const POLE: f64 = 1.0 / 1024.0;
 
-/// The mean and the Jacobian of a panorama: those of atan2(t.x, t.z) and atan2(t.y, |t.xz|), where the distance from the
-/// axis through the poles is kept from falling below `POLE` times the distance.
+/// The mean and the Jacobian of a panorama: those of atan2(t.x, t.z) and atan2(t.y, |t.xz|), where the distance from
+/// the axis through the poles is kept from falling below `POLE` times the distance.
 pub fn equirectangular(camera: &OracleCamera, t: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
     let [fx, fy] = camera.focal.map(f64::from);
     let [cx, cy] = camera.principal.map(f64::from);

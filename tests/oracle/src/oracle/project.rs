@@ -219,7 +219,7 @@ fn rotation_matrix(quaternion: [f64; 4]) -> [f64; 9] {
 /// True if the binary64 error of the sort value reaches across the midpoint of two binary32 values.
 ///
 /// Camera coordinates are sums of three products of differences: five roundings at most on each term. A length adds
-/// three more, and errs by no more than the vector.
+/// three more, and its error is at most that of the vector.
 fn key_is_undecidable(rotation: &[f64; 9], offset: [f64; 3], lost: f64, sort_by: f64) -> bool {
     let magnitude = |row: usize| -> f64 {
         (0..3)

@@ -1,9 +1,9 @@
 //! 2D Gaussians: the intersection of a pixel's ray with a disc's plane.
 //!
-//! In camera axes a disc has the scaled axes `a` and `b` and the centre `t`. A ray from `g` along `r` meets its plane where
-//! `u a + v b + t - g = tau r`: by Cramer's rule `u = ((b x t') . r) / w`, `v = ((t' x a) . r) / w`,
-//! `tau = ((a x b) . t') / w`, `w = (a x b) . r`, `t' = t - g`. The squared distance is `u^2 + v^2` where the ray meets the
-//! plane (for a pinhole: at `tau > nearPlane`), or the filter's `|x - mean|^2 / lowPass` if that is less.
+//! In camera axes a disc has the scaled axes `a` and `b` and the centre `t`. A ray from `g` along `r` meets its plane
+//! where `u a + v b + t - g = tau r`: by Cramer's rule `u = ((b x t') . r) / w`, `v = ((t' x a) . r) / w`, `tau = ((a x
+//! b) . t') / w`, `w = (a x b) . r`, `t' = t - g`. The squared distance is `u^2 + v^2` where the ray meets the plane
+//! (for a pinhole: at `tau > nearPlane`), or the filter's `|x - mean|^2 / lowPass` if that is less.
 
 use super::error_model::UNIT_ROUNDOFF;
 use super::{OracleCamera, OracleModel};

@@ -12,7 +12,8 @@ const ALPHA: f64 = 1.0;
 const BETA: f64 = 2.0;
 const KAPPA: f64 = 0.0;
 
-/// Points in the picture, less their mean, each times the root of its weight; the covariance is the sum of their squares.
+/// Points in the picture, less their mean, each times the root of its weight; the covariance is the sum of their
+/// squares.
 pub type Deviations = Vec<[f64; 2]>;
 
 /// The mean of the picture of a Gaussian at `t` with these axes (each as long as a standard deviation), all in camera

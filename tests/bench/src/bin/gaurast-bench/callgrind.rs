@@ -25,8 +25,8 @@ pub struct Counted {
     pub output: String,
 }
 
-/// Runs this program at [`LEVEL`] on one thread: with `arguments` and more `environment`, and with `input` as its standard
-/// input.
+/// Runs this program at [`LEVEL`] on one thread: with `arguments` and more `environment`, and with `input` as its
+/// standard input.
 ///
 /// # Errors
 /// If Callgrind is not installed, or the process fails.

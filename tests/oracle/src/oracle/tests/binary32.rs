@@ -37,7 +37,7 @@ enum Conic {
 }
 
 impl Record {
-    /// A careful record is the binary64 one rounded; careless parts are binary32 all the way from
+    /// A careful record is the rounded binary64 one. Careless parts are computed in binary32, starting with
     /// `t`, which the extension evaluates in binary64.
     fn new(
         splat: &Splat,

@@ -200,8 +200,8 @@ impl Work {
         Ok(start.elapsed())
     }
 
-    /// Records `count` draws into one pass, each with a scissor and a vertex buffer of its own, and returns the time that
-    /// it took.
+    /// Records `count` draws into one pass, each with a scissor and a vertex buffer of its own, and returns the time
+    /// that it took.
     ///
     /// # Errors
     /// The error of recording.

@@ -39,7 +39,8 @@ pub struct CountsArguments {
     #[arg(long, value_name = "COUNT", value_enum)]
     only: Vec<Part>,
 
-    /// Compares a frame's instructions through the Vulkan loader, by the driver of this manifest, with the embedded driver's
+    /// Compares a frame's instructions through the Vulkan loader, by the driver of this manifest, with the embedded
+    /// driver's
     #[arg(long, value_name = "ICD.json", conflicts_with_all = ["store", "only"])]
     loader: Option<PathBuf>,
 }
