@@ -2,7 +2,7 @@
 //!
 //! | module | contents |
 //! |---|---|
-//! | [`gpu`] | devices of this driver and of lavapipe, with a SIMD level and a number of threads; recording, submission |
+//! | [`gpu`] | devices of this driver and of lavapipe, with a SIMD level and a thread count; recording, submission |
 //! | [`resource`] | buffers, images with upload and readback, samplers |
 //! | [`descriptors`] | descriptor sets |
 //! | [`pipeline`] | graphics pipelines, of triangles and of Gaussians, and compute pipelines |

@@ -140,8 +140,8 @@ fn module(path: &str, debug_name: &str) -> Option<String> {
     if !CRATES.contains(parts.first()?) {
         return None;
     }
-    // The last part is the function's name, or a type's name if the function is associated with it. For a function in an
-    // implementation or a closure, it is the name of the module or of the surrounding function.
+    // The last part is the function's name, or a type's name if the function is associated with it. For a function
+    // in an implementation or a closure, it is the name of the module or of the surrounding function.
     let is_within = path[..end].ends_with("::");
     let length = parts.len() - usize::from(!is_within);
     Some(parts[..length.clamp(1, 4)].join("::"))
