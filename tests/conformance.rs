@@ -1,4 +1,4 @@
-//! Tests that hold what the driver does against the binary64 oracle, exact models, and other drivers.
+//! Conformance tests: they compare the driver with the binary64 oracle, exact models and other drivers.
 
 mod driver;
 mod gaussian;

@@ -1,4 +1,4 @@
-//! The short form of the example `long_run`, in a process that does nothing else, since it watches memory.
+//! The short form of the example `long_run`. It has a process of its own because it measures the process's memory.
 
 use gaurast_tests::long_run;
 

@@ -1,4 +1,4 @@
-//! Tests of what happens where something is wrong: input that nobody would write, memory that is wanting, and long runs.
+//! Robustness tests: invalid input, failing allocations, and long runs.
 
 mod faults;
 mod fuzzing;

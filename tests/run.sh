@@ -1,13 +1,14 @@
 #!/usr/bin/env bash
-# Runs every check of the project, installing what it needs where that is missing, and saying so.
+# Runs every check of the project. It installs missing programs and prints their names.
 #
-# Prints the seconds of each step, the slowest tests, and what was ignored and why. A test that can't run is ignored;
-# GAURAST_TEST_REQUIRE=programs makes that a failure where a program or a system file is missing, GAURAST_TEST_REQUIRE=all
-# where real data (GAURAST_TEST_DATA) are missing too. GAURAST_TEST_LONG=1 runs whole what otherwise is a small sample.
+# Prints the seconds of each step, the slowest tests, and the reasons for which tests were ignored. A test that cannot run
+# is ignored. With GAURAST_TEST_REQUIRE=programs, a missing program or system file is a failure; with
+# GAURAST_TEST_REQUIRE=all, missing test data (GAURAST_TEST_DATA) are too. GAURAST_TEST_LONG=1 runs tests completely that
+# otherwise use a small sample.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-# The programs and files that the tests use, and Debian's packages that bring them.
+# The programs and files that the tests use, and the Debian packages that contain them.
 missing=()
 need() { # need PACKAGE COMMAND-OR-FILE
     command -v "$2" >/dev/null 2>&1 || [ -e "$2" ] || missing+=("$1")
@@ -55,7 +56,7 @@ if [ -z "${GAURAST_VK_XML:-}" ] || [ -z "${GAURAST_SPIRV_GRAMMAR:-}" ]; then
     fi
 fi
 
-# Tells of all steps so far; also where one failed.
+# Prints a report on all steps so far; also after a failure.
 tell() {
     echo
     echo "== the slowest tests, in seconds"
@@ -80,7 +81,7 @@ step() { # step NAME COMMAND...
     printf '%6d  %s\n' $((SECONDS - start)) "$name" >>"$work/steps"
 }
 
-# With optimisation, since the oracle compares whole images, and with debug assertions and overflow checks.
+# The profile is optimised, since the oracle compares whole images, and checks debug assertions and overflow.
 tests=(--workspace --profile checked --lib --bins --tests)
 step format cargo fmt --all --check
 step clippy cargo clippy --workspace --all-targets --profile checked --quiet -- -D warnings
@@ -96,13 +97,13 @@ specification() {
     fi
 }
 step specification specification
-# As cargo test would, and with them what tests start or load: the loader's library, a sample.
+# Builds the tests, and the files that tests start or load: the loader's library and a sample.
 step "build tests" cargo build "${tests[@]}" --example hello_gaussians --quiet
 GAURAST_TEST_LIBRARIES=$(realpath "${CARGO_TARGET_DIR:-target}/checked")
 export GAURAST_TEST_LIBRARIES
 step tests cargo test "${tests[@]}" --quiet --no-fail-fast
 step "documentation tests" cargo test --workspace --profile checked --doc --quiet
-# What frames cost, in instructions: times would depend on the machine.
+# Counts the instructions of frames, since times depend on the machine.
 step "build benchmarks" cargo build --profile profiling --quiet -p gaurast-bench
 step counts cargo run --profile profiling --quiet -p gaurast-bench -- counts
 printf '%6d  %s\n' $SECONDS all >>"$work/steps"

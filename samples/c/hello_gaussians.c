@@ -13,7 +13,7 @@
 enum { SIZE = 256, FLOATS = 14, COUNT = 5 };
 static const VkFormat FORMAT = VK_FORMAT_R8G8B8A8_UNORM;
 
-/* Position, scale, rotation (w x y z), opacity, and the constant spherical harmonic's colour. */
+/* Position, scale, rotation (w x y z), opacity, and the coefficient of the constant spherical harmonic. */
 static const float GAUSSIANS[COUNT][FLOATS] = {
     {0.0f, 0.0f, 3.0f, 0.25f, 0.25f, 0.25f, 1.0f, 0.0f, 0.0f, 0.0f, 0.9f, 1.7f, 1.2f, -1.0f},
     {-0.7f, 0.0f, 3.2f, 0.10f, 0.45f, 0.10f, 1.0f, 0.0f, 0.0f, 0.2f, 0.8f, 1.7f, -1.4f, -1.2f},
@@ -89,7 +89,7 @@ static void create_device(void) {
     CHECK(vkCreateDevice(physical, &info, NULL, &device));
 }
 
-/* No shaders, but the topology, and where a Gaussian's numbers are. */
+/* A pipeline without shaders: it has the topology and the attributes of a Gaussian. */
 static VkPipeline create_pipeline(void) {
     VkVertexInputBindingDescription binding = {0, FLOATS * sizeof(float), VK_VERTEX_INPUT_RATE_VERTEX};
     VkVertexInputAttributeDescription attributes[] = {
@@ -131,7 +131,7 @@ static VkPipeline create_pipeline(void) {
     return pipeline;
 }
 
-/* A camera at the origin that looks along +z, as wide as it is far. */
+/* A camera at the origin that looks along +z. At a distance of 1, its picture is 1 wide. */
 static void set_camera(VkCommandBuffer commands) {
     const double eye[3] = {0, 0, 0}, ahead[3] = {0, 0, 1}, up[3] = {0, -1, 0};
     VkGaussianCameraGAURAST camera =

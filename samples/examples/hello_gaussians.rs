@@ -1,5 +1,5 @@
-//! The least that draws 3D Gaussians: plain `ash` in one file. It writes hello_gaussians.png, and
-//! objects go with the process; the crate's `renderer` module does the same tidily.
+//! A minimal program that draws 3D Gaussians: plain `ash` in one file. It writes hello_gaussians.png. The end of the
+//! process frees the objects; the crate's `renderer` module shows proper cleanup.
 
 use ash::vk::{self, MemoryPropertyFlags as Memory, PipelineStageFlags as Stage};
 use gaurast::{gaussian_primitive_topology, vk::*};
@@ -21,8 +21,8 @@ const GAUSSIANS: [[f32; 14]; 5] = [
 #[rustfmt::skip] // A step a line, so that a screen or two show everything.
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let entry = vulkan_gaurast::entry();
-    // SAFETY: handles are used while they live, structures are valid, commands are in order, and the
-    // host touches memory only while the device is idle.
+    // SAFETY: handles are used while they are valid, structures are valid, commands are in order, and the host touches
+    // memory only while the device is idle.
     unsafe {
         // A device with the extension.
         let app = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
@@ -76,7 +76,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             .view_type(vk::ImageViewType::TYPE_2D).format(FORMAT).subresource_range(range);
         let view = device.create_image_view(&info, None)?;
 
-        // The pipeline: no shaders, but the topology, and where a Gaussian's numbers are.
+        // The pipeline: no shaders, but the topology and the attributes of a Gaussian.
         let bindings = [vk::VertexInputBindingDescription::default().stride(14 * 4)];
         let attribute = |location: u32, format, first: u32| {
             vk::VertexInputAttributeDescription { location, binding: 0, format, offset: 4 * first }
@@ -136,7 +136,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         device.queue_submit(device.get_device_queue(0, 0), &submits, vk::Fence::null())?;
         device.device_wait_idle()?;
 
-        // Rows of a linear image may be padded. Without the premultiplied alpha, it is over black.
+        // Rows of a linear image may be padded. Without its premultiplied alpha, the picture is over black.
         let plane = vk::ImageSubresource::default().aspect_mask(vk::ImageAspectFlags::COLOR);
         let layout = device.get_image_subresource_layout(image, plane);
         image::RgbImage::from_fn(SIZE, SIZE, |x, y| {

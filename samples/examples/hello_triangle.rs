@@ -1,7 +1,7 @@
-//! The least that draws a triangle: plain `ash` in one file, and nothing of this driver's but the door.
+//! A minimal program that draws a triangle: plain `ash` in one file. Only the entry is this driver's.
 //!
-//! It writes hello_triangle.png, by this device or, with the argument `--loader`, by whatever device the Vulkan loader
-//! finds first: the same program runs on both.
+//! It writes hello_triangle.png. It uses this driver or, with the argument `--loader`, the first device that the Vulkan
+//! loader finds: the same program runs on both.
 
 use ash::vk::{self, MemoryPropertyFlags as Memory, PipelineStageFlags as Stage};
 
@@ -9,7 +9,7 @@ const SIZE: u32 = 256;
 const FORMAT: vk::Format = vk::Format::R8G8B8A8_UNORM;
 const DRAWN: Stage = Stage::COLOR_ATTACHMENT_OUTPUT;
 
-/// Position and colour.
+/// A vertex: position and colour.
 #[rustfmt::skip]
 const VERTICES: [[f32; 5]; 3] = [
     [ 0.0, -0.8,  1.0, 0.2, 0.1],
@@ -20,8 +20,8 @@ const VERTICES: [[f32; 5]; 3] = [
 #[rustfmt::skip] // A step a line, so that a screen or two show everything.
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let through_loader = std::env::args().any(|argument| argument == "--loader");
-    // SAFETY: the system's loader is sound. Handles are used while they live, structures are valid, commands are in
-    // order, and the host touches memory only while the device is idle.
+    // SAFETY: the system's loader is sound. Handles are used while they are valid, structures are valid, commands are
+    // in order, and the host touches memory only while the device is idle.
     unsafe {
         let entry = if through_loader { ash::Entry::load()? } else { vulkan_gaurast::entry() };
 
@@ -56,7 +56,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             Ok::<_, vk::Result>((buffer, mapped.cast::<u8>()))
         };
 
-        // The vertices, and where the picture is copied to.
+        // The vertices, and the buffer to which the picture is copied.
         let bytes: &[u8] = bytemuck::cast_slice(&VERTICES);
         let (vertices, mapped) = mapped_buffer(bytes.len() as u64, vk::BufferUsageFlags::VERTEX_BUFFER)?;
         mapped.copy_from(bytes.as_ptr(), bytes.len());
@@ -78,7 +78,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             .view_type(vk::ImageViewType::TYPE_2D).format(FORMAT).subresource_range(range);
         let view = device.create_image_view(&info, None)?;
 
-        // The pipeline: two shaders and where a vertex's numbers are.
+        // The pipeline: two shaders and the attributes of a vertex.
         let module = |bytes: &[u8]| {
             let words = ash::util::read_spv(&mut std::io::Cursor::new(bytes))?;
             let info = vk::ShaderModuleCreateInfo::default().code(&words);

@@ -1,8 +1,8 @@
-//! A floor of large 2D Gaussians, textured as a chessboard and seen at a grazing angle, beside the same floor of flat 3D
+//! A floor of large 2D Gaussians, coloured as a chessboard and seen at a grazing angle, and the same floor of flat 3D
 //! Gaussians: `tilted_plane FOLDER` writes surfels.png and ellipses.png.
 //!
-//! A surfel is evaluated where each pixel's ray meets its plane, so that lines of the board stay straight up to the
-//! viewer's feet. A 3D Gaussian's picture is an ellipse, whose error grows with what it covers of the field of view.
+//! A 2D Gaussian is evaluated at the intersection of each pixel's ray with its plane, so the lines of the board are
+//! straight everywhere. The picture of a 3D Gaussian is an ellipse, whose error grows with its angular size.
 
 use std::error::Error;
 use std::path::Path;
@@ -11,7 +11,7 @@ use gaurast_render::{Geometry, Renderer, Settings};
 use gaurast_scene::camera::Camera;
 use gaurast_scene::{GaussianShape, Scene};
 
-/// Discs to a side of the floor, and their distance.
+/// The number of discs along a side of the floor, and their distance.
 const SIDE: i32 = 24;
 const STEP: f32 = 0.5;
 
@@ -23,7 +23,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             let position = [(column - SIDE / 2) as f32 * STEP, 0.0, row as f32 * STEP];
             let shape = GaussianShape {
                 scale: [0.22 * STEP, 0.22 * STEP, 0.0],
-                // From x and y to x and z.
+                // Rotates the axes x and y to x and z.
                 rotation: [0.5f32.sqrt(), 0.5f32.sqrt(), 0.0, 0.0],
                 opacity: 0.98,
             };

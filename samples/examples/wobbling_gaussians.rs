@@ -1,6 +1,6 @@
-//! Gaussians by shaders of one's own: a vertex shader makes and projects them, here rings that wobble
-//! with time, and a resolve shader makes a colour of what they accumulate at each pixel: fog by their
-//! expected depth, and tone mapping. It writes wobbling_gaussians.png, four moments side by side.
+//! Gaussians by an application's own shaders. A vertex shader makes and projects them, here rings that wobble with
+//! time. A resolve shader computes a colour from the accumulated values of each pixel: fog by the expected depth, and
+//! tone mapping. It writes wobbling_gaussians.png, four moments side by side.
 
 use ash::vk::{self, MemoryPropertyFlags as Memory, PipelineStageFlags as Stage};
 use gaurast::{gaussian_primitive_topology, vk::*};
@@ -9,17 +9,17 @@ const SIZE: u32 = 256;
 const FORMAT: vk::Format = vk::Format::R8G8B8A8_UNORM;
 const DRAWN: Stage = Stage::COLOR_ATTACHMENT_OUTPUT;
 
-/// Moments that are drawn, in seconds.
+/// The moments that are drawn, in seconds.
 const TIMES: [f32; 4] = [0.0, 0.7, 1.4, 2.1];
-/// Gaussians of a ring, and rings.
+/// The number of Gaussians of a ring, and the number of rings.
 const COUNTS: [u32; 2] = [96 * 24, 5];
 const FOG: [f32; 4] = [0.55, 0.62, 0.72, 1.0];
 
 #[rustfmt::skip] // A step a line, so that a screen or two show everything.
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let entry = vulkan_gaurast::entry();
-    // SAFETY: handles are used while they live, structures are valid, commands are in order, and the
-    // host touches memory only while the device is idle.
+    // SAFETY: handles are used while they are valid, structures are valid, commands are in order, and the host touches
+    // memory only while the device is idle.
     unsafe {
         // A device with the extension.
         let app = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
@@ -65,7 +65,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             .view_type(vk::ImageViewType::TYPE_2D).format(FORMAT).subresource_range(range);
         let view = device.create_image_view(&info, None)?;
 
-        // The pipeline: two shaders, and the locations at which they and the rasterizer meet.
+        // The pipeline: two shaders, and the locations of their outputs and inputs.
         let module = |code: &[u8]| {
             let code = ash::util::read_spv(&mut std::io::Cursor::new(code))?;
             let info = vk::ShaderModuleCreateInfo::default().code(&code);

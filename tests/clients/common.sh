@@ -1,5 +1,5 @@
-# What the clients' scripts share. Each runs one program by strangers on this driver, through the Vulkan loader: it exits
-# with 0 where the program did what it should, 1 where not, and 77, with the reason, where it can't run here.
+# Functions of the clients' scripts. Each script runs one third-party program on this driver, through the Vulkan loader.
+# It exits with 0 if the program worked, with 1 if it did not, and with 77 and the reason if it cannot run here.
 set -eu
 root=$(cd "$(dirname "$0")/../.." && pwd)
 out=${GAURAST_CLIENTS_OUT:-$(mktemp -d)}
@@ -15,21 +15,21 @@ failed() {
     exit 1
 }
 
-# need PROGRAM...: the script is ignored without them.
+# need PROGRAM...: the script is ignored if a program is missing.
 need() {
     for program in "$@"; do
         command -v "$program" > /dev/null || ignored "there is no $program"
     done
 }
 
-# The driver's library, as it was built last; GAURAST_LIBRARY names another.
+# The driver's library from the last release build, unless GAURAST_LIBRARY names another.
 library=${GAURAST_LIBRARY:-$root/target/release/libvulkan_gaurast.so}
 [ -e "$library" ] || ignored "there is no $library: cargo build --release, or GAURAST_LIBRARY"
 manifest=$out/gaurast_icd.json
 sed "s#\"library_path\": *\"[^\"]*\"#\"library_path\": \"$library\"#" "$root/driver/icd/gaurast_icd.json" > "$manifest"
 export VK_DRIVER_FILES="$manifest" VK_ICD_FILENAMES="$manifest"
 
-# start_xvfb: starts an X server without a screen, which ends with the script.
+# start_xvfb: starts an X server without a screen. It ends with the script.
 start_xvfb() {
     need Xvfb
     number=$out/display
@@ -42,14 +42,14 @@ start_xvfb() {
     export DISPLAY=":$display"
 }
 
-# picture NAME: what the X server shows now.
+# picture NAME: writes the current picture of the X server to a file.
 picture() {
     if command -v import > /dev/null; then
         import -window root "$out/$1.png"
     fi
 }
 
-# colours FILE: how many colours a picture has.
+# colours FILE: prints the number of colours of a picture.
 colours() {
     identify -format %k "$1"
 }

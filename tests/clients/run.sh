@@ -1,5 +1,5 @@
 #!/bin/sh
-# Runs every client: passed, failed, or ignored with the reason. GAURAST_LIBRARY names the driver's library, if it isn't
+# Runs every client: passed, failed, or ignored with the reason. GAURAST_LIBRARY names the driver's library, by default
 # target/release/libvulkan_gaurast.so.
 cd "$(dirname "$0")"
 code=0
@@ -8,7 +8,7 @@ for script in *.sh; do
         run.sh | common.sh) ;;
         *)
             sh "$script"
-            # What is ignored has said so.
+            # An ignored client has printed the reason.
             case $? in 0 | 77) ;; *) code=1 ;; esac
             ;;
     esac

@@ -1,6 +1,6 @@
 #!/bin/sh
-# vkcube of vulkan-tools, in C and C++, on X11 over libxcb, and on Wayland under a headless weston: a textured cube
-# turns for a while in a window.
+# Runs vkcube of vulkan-tools, in C and C++, on X11 over libxcb, and on Wayland under a headless weston: a textured cube
+# rotates for a while in a window.
 . "$(dirname "$0")/common.sh"
 need vkcube import identify
 start_xvfb

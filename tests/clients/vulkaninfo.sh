@@ -1,9 +1,9 @@
 #!/bin/sh
-# vulkaninfo of vulkan-tools: it asks for everything, surfaces of X11 too, and finds one device, of version 1.3.
+# Runs vulkaninfo of vulkan-tools: it makes all queries, also of X11 surfaces, and finds one device of version 1.3.
 . "$(dirname "$0")/common.sh"
 need vulkaninfo
 start_xvfb
-# libwayland complains where there is none.
+# libwayland prints a message if there is no Wayland.
 XDG_RUNTIME_DIR=$out/runtime
 export XDG_RUNTIME_DIR
 mkdir -p "$XDG_RUNTIME_DIR"

@@ -1,4 +1,4 @@
-//! Device addresses: buffers reached by numbers, within their bounds.
+//! Buffer device addresses: access to buffers through pointers, within their bounds.
 
 use ash::vk;
 use gaurast_testkit::shader::{Stage, compile};
@@ -7,7 +7,7 @@ use gaurast_testkit::{Gpu, Kernel};
 use crate::GLSLANG;
 use crate::triangles::devices::own;
 
-/// A buffer that has an address, with memory that the host can map.
+/// A buffer with an address and host-visible memory.
 struct Addressed {
     raw: vk::Buffer,
     memory: vk::DeviceMemory,
@@ -58,7 +58,7 @@ impl Addressed {
     fn read(&self) -> Vec<u32> {
         let device = self.gpu.device();
         let mut words = vec![0u32; self.words];
-        // SAFETY: the memory is as long, and the device is idle.
+        // SAFETY: the memory has this length, and the device is idle.
         unsafe {
             let from = device
                 .map_memory(self.memory, 0, vk::WHOLE_SIZE, vk::MemoryMapFlags::empty())
@@ -70,7 +70,7 @@ impl Addressed {
         words
     }
 
-    /// The two words of its address, moved on by some bytes.
+    /// The two words of its address plus an offset in bytes.
     fn at(&self, offset: u64) -> [u32; 2] {
         let address = self.address + offset;
         [address as u32, (address >> 32) as u32]
@@ -96,7 +96,7 @@ const HEAD: &str = "
     layout(buffer_reference, std430, buffer_reference_align = 16) buffer Node { Node next; uint value; uint pad; };
     layout(push_constant) uniform Push { Words target; Words source; Node first; };";
 
-/// Pointers come in push constants and from memory; what they point at is read, written and counted up.
+/// Pointers come from push constants and from memory. Shaders read, write and count atomically through them.
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn buffers_are_reached_by_their_addresses() {
     let gpu = own();
@@ -104,7 +104,7 @@ fn buffers_are_reached_by_their_addresses() {
     let source = Addressed::of(gpu, &[11, 22, 33, 44]);
     assert!(target.address != 0 && source.address != 0 && target.address != source.address);
     assert_eq!(target.address % 16, 0);
-    // A list of three nodes, the last of which points at nothing.
+    // A list of three nodes, the last of which has a null pointer.
     let last = Addressed::of(gpu, &[0, 0, 300, 0]);
     let [low, high] = last.at(0);
     let second = Addressed::of(gpu, &[low, high, 200, 0]);
@@ -133,7 +133,7 @@ fn buffers_are_reached_by_their_addresses() {
     assert_eq!(target.read(), [45, 34, 23, 12, 600, 15, 22, 0]);
 }
 
-/// An address beyond a buffer, before it, or of a buffer that is gone reads zero, and what is written there is lost.
+/// A read beyond a buffer, before it, or of a destroyed buffer gives zero, and a write there has no effect.
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn addresses_keep_to_their_buffers() {
     let gpu = own();

@@ -1,4 +1,4 @@
-//! Near and far planes that clip, or don't, whether or not depth is clamped.
+//! Clipping at the near and far planes, on or off, with and without depth clamp.
 
 use ash::vk;
 use gaurast_testkit::{
@@ -7,7 +7,7 @@ use gaurast_testkit::{
 
 use crate::GLSLANG;
 
-/// The depth that a fragment shader sees of a triangle that covers everything at depth `z`; None where it is clipped.
+/// The depth that a fragment shader gets for a triangle that covers the target at depth `z`; `None` if it is clipped.
 fn depth_seen(gpu: &Gpu, clamp: bool, clip: Option<bool>, z: f32) -> Option<f32> {
     let mut state = vk::PipelineRasterizationDepthClipStateCreateInfoEXT::default()
         .depth_clip_enable(clip.unwrap_or(false));

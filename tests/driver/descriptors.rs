@@ -1,4 +1,4 @@
-//! Descriptor sets: arrays without a length, sets updated after they were bound, variable counts, inline uniform blocks.
+//! Descriptor sets: arrays without a length, updates after binding, variable counts, inline uniform blocks.
 
 use ash::vk;
 use gaurast_testkit::shader::{Stage, compile};
@@ -10,7 +10,7 @@ use crate::triangles::devices::own;
 const STORAGE: vk::DescriptorType = vk::DescriptorType::STORAGE_BUFFER;
 const INLINE: vk::DescriptorType = vk::DescriptorType::INLINE_UNIFORM_BLOCK;
 
-/// A set of bindings numbered from 0, each a kind, a count and flags, with its layout and pool.
+/// A set with its layout and pool. Its bindings are numbered from 0; each has a type, a count and flags.
 struct Set {
     raw: vk::DescriptorSet,
     layout: vk::DescriptorSetLayout,
@@ -61,7 +61,7 @@ impl Set {
         }
     }
 
-    /// Makes an element of a binding a whole buffer.
+    /// Writes a whole buffer to an element of a binding.
     fn write(&self, binding: u32, element: u32, buffer: &Buffer) {
         let info = [vk::DescriptorBufferInfo::default()
             .buffer(buffer.raw)
@@ -119,7 +119,7 @@ fn layout(gpu: &Gpu, rows: &[Row]) -> Result<vk::DescriptorSetLayout, vk::Result
         .flags(vk::DescriptorSetLayoutCreateFlags::UPDATE_AFTER_BIND_POOL)
         .bindings(&bindings)
         .push_next(&mut flags);
-    // SAFETY: the create info is valid but for what a test is about.
+    // SAFETY: the create info is valid, except in tests of invalid ones.
     unsafe { gpu.device().create_descriptor_set_layout(&info, None) }
 }
 
@@ -127,8 +127,8 @@ fn words(buffer: &Buffer) -> Vec<u32> {
     bytemuck::pod_collect_to_vec(&buffer.read())
 }
 
-/// A set is bound, and then updated, before the command buffer is submitted; and again between two submissions of it.
-/// Invocations of one subgroup index an array without a length at different elements, of which some were never written.
+/// A set is bound, and is updated before the command buffer is submitted and between two submissions. Invocations of
+/// one subgroup index an array without a length at different elements, some of which were never written.
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn sets_are_updated_after_they_were_bound() {
     let gpu = own();
@@ -193,7 +193,8 @@ fn sets_are_updated_after_they_were_bound() {
     assert_eq!(words(&result), expected(true));
 }
 
-/// A set that has fewer descriptors of its last binding than the layout says has no more, and takes no more of its pool.
+/// A set may have fewer descriptors of its last binding than the layout says. It then has only these, and takes only
+/// these from its pool.
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn sets_choose_the_length_of_their_last_binding() {
     let gpu = own();
@@ -225,7 +226,7 @@ fn sets_choose_the_length_of_their_last_binding() {
     let (result, input) = (Buffer::new(gpu, 16), Buffer::of(gpu, &[7u32; 4]));
     set.write(0, 0, &result);
     set.write(1, 1, &input);
-    // Beyond the set: nothing is written, and nothing else breaks.
+    // Beyond the set: nothing is written, and nothing else changes.
     set.write(1, 2, &input);
     let kernel = Kernel::over(
         gpu,
@@ -244,12 +245,12 @@ fn sets_choose_the_length_of_their_last_binding() {
     );
     kernel.run(&[set.raw], &[], [1, 1, 1]);
     assert_eq!(words(&result), [0, 7, 0, 0]);
-    // Only the last binding may leave its length open.
+    // Only the last binding may have a variable count.
     let wrong = [(STORAGE, 4, variable), rows[0]];
     assert!(layout(gpu, &wrong).is_err());
 }
 
-/// Bytes are written to a block by parts, by a copy and by a template, also after the set was bound.
+/// Bytes are written to a block in parts, by a copy and by a template, also after the set was bound.
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn inline_uniform_blocks_hold_bytes() {
     let gpu = own();

@@ -1,5 +1,5 @@
-//! States of draws that a command buffer sets, and draws of which several are one command: each is held against pipelines
-//! that have the state, or draws that are recorded one by one.
+//! Dynamic states, and commands that make several draws. Each is compared with pipelines that have the state, or with
+//! draws that are recorded one by one.
 
 use ash::vk;
 use gaurast_testkit::{
@@ -142,7 +142,7 @@ fn triangles() -> Vec<Vertex> {
     ]
 }
 
-/// A state, off and on: as a pipeline has it, and as a command buffer sets it.
+/// A state, off and on: in a pipeline, and set by a command buffer.
 struct Case {
     state: S,
     samples: u32,
@@ -192,7 +192,7 @@ fn provoking(on: bool) -> vk::ProvokingVertexModeEXT {
     }
 }
 
-/// The structures that make a pipeline's rasterization state, which live as long as the program.
+/// Chains a structure to a pipeline's rasterization state. It is never freed.
 fn chained<T: 'static>(options: &mut PipelineOptions<'_>, structure: T) {
     let leaked: &'static mut T = Box::leak(Box::new(structure));
     options.raster.p_next = std::ptr::from_mut(leaked).cast();
@@ -290,7 +290,7 @@ fn cases() -> Vec<Case> {
         case(
             S::LOGIC_OP_ENABLE_EXT,
             1,
-            // The operation of a pipeline that has none is the first, which clears.
+            // A pipeline without a logic operation has the value of the first one, which clears.
             |options, on| options.logic_op = on.then_some(vk::LogicOp::CLEAR),
             // SAFETY: see above.
             |device, c, on| unsafe { device.states.cmd_set_logic_op_enable(c, on) },
@@ -347,7 +347,7 @@ fn cases() -> Vec<Case> {
         case(
             S::COLOR_WRITE_ENABLE_EXT,
             1,
-            // What is not written at all is what no component is written of.
+            // A disabled attachment is equal to a write mask of no component.
             |options, on| {
                 let all = vk::ColorComponentFlags::RGBA;
                 let mask = if on {
@@ -381,7 +381,7 @@ fn what_is_set_is_as_what_a_pipeline_has() {
             let fixed = device.draw(case.samples, &options(on), &vertices, |commands| {
                 commands.draw(0..6);
             });
-            // The pipeline's own value is the other one, but where that would write nothing, or is not kept.
+            // The pipeline's own value is the opposite, except where that would write nothing or is not preserved.
             let own = match case.state {
                 S::COLOR_WRITE_ENABLE_EXT => true,
                 _ => !on,
@@ -399,7 +399,7 @@ fn what_is_set_is_as_what_a_pipeline_has() {
     }
 }
 
-/// Attributes that are set are read from where they are, and in their format.
+/// Vertex attributes that a command sets are read with their offsets and formats.
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn vertex_input_is_set() {
     let device = Device::new();
@@ -407,7 +407,7 @@ fn vertex_input_is_set() {
     let fixed = device.draw(1, &PipelineOptions::default(), &vertices, |commands| {
         commands.draw(0..3);
     });
-    // The pipeline has none of its own.
+    // The pipeline has no vertex input of its own.
     let options = PipelineOptions {
         vertex_bindings: Vec::new(),
         vertex_attributes: Vec::new(),
@@ -457,7 +457,7 @@ fn vertex_input_is_set() {
     assert!(sparse == expected);
 }
 
-/// Draws of one command are those of several, and each knows its number.
+/// A command of several draws equals several commands, and each draw has its `gl_DrawID`.
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn several_draws_are_one_command() {
     let device = Device::new();
@@ -519,12 +519,12 @@ fn several_draws_are_one_command() {
         })
     };
     assert!(draw(None) == drawn);
-    // One offset instead of each one's: both draw the second triangle.
+    // One offset for both draws: both draw the second triangle.
     let both = draw(Some(3));
     assert_eq!((blue(&both, 4, 4), blue(&both, 28, 28)), (191, 64));
 }
 
-/// A list begins anew at the index of all ones.
+/// Restart in a list begins a new primitive at the index of all ones.
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn lists_restart() {
     let device = Device::new();
@@ -545,7 +545,7 @@ fn lists_restart() {
     assert!(restarted == second);
 }
 
-/// Lines are rectangles, whether that is asked for or not; they are no other.
+/// Lines are rectangular, whether requested or not; other line modes are not supported.
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn lines_are_rectangles() {
     let device = Device::new();

@@ -1,4 +1,4 @@
-//! Limits that programs ask for, reached.
+//! Tests that use limits that programs ask for, up to their values.
 
 use ash::vk;
 use gaurast_testkit::shader::{Stage, compile};
@@ -11,7 +11,7 @@ use gaurast_tests::triangles::shapes;
 use crate::GLSLANG;
 use crate::triangles::devices::own;
 
-/// The words that a kernel leaves in a buffer of as many, which is its binding 0.
+/// The words that a kernel writes to its binding 0, a buffer of this size.
 fn words(buffer: &Buffer) -> Vec<u32> {
     bytemuck::pod_collect_to_vec(&buffer.read())
 }
@@ -81,7 +81,7 @@ fn varyings_of_128_components_arrive() {
     assert!(found.iter().all(|right| *right == 32.0), "{:?}", found[0]);
 }
 
-/// As many workgroups as the limit says run in each direction.
+/// Dispatches of the greatest number of workgroups run in each dimension.
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn dispatches_of_65535_workgroups_run() {
     let gpu = own();
@@ -118,7 +118,7 @@ fn texel_buffers_have_two_to_the_27_texels() {
             .buffer(texels.raw)
             .format(vk::Format::R8_UINT)
             .range(range);
-        // SAFETY: the buffer is alive, and what is wrong is refused.
+        // SAFETY: the buffer is alive, and the device refuses a wrong create info.
         unsafe { device.create_buffer_view(&info, None) }
     };
     assert!(view(u64::from(count) + 1).is_err());
@@ -150,7 +150,7 @@ fn texel_buffers_have_two_to_the_27_texels() {
     unsafe { device.destroy_buffer_view(view, None) };
 }
 
-/// Offsets at both ends of the range move what is sampled, fetched and gathered by so many texels.
+/// Texel offsets at both ends of the range shift samples, fetches and gathers by this number of texels.
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn texel_offsets_reach_from_minus_32_to_31() {
     let gpu = own();
@@ -178,7 +178,7 @@ fn texel_offsets_reach_from_minus_32_to_31() {
         Resource::Texture(image.view, sampler.raw),
     ];
     let bindings = Bindings::new(gpu, &resources);
-    // The compiler takes no constant offsets beyond Vulkan's least range: others are put in their place.
+    // The compiler accepts only constant offsets in Vulkan's minimum range, so the words are patched.
     let words: Vec<u32> = compile(
         Stage::Compute,
         "layout(local_size_x = 1) in;
@@ -219,7 +219,7 @@ fn texel_offsets_reach_from_minus_32_to_31() {
     );
 }
 
-/// An image as long as the limit in each of its three dimensions is sampled at its far end.
+/// An image with the greatest length in each of its three dimensions is sampled at its far end.
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn volumes_are_4096_texels_long() {
     let gpu = own();
@@ -258,7 +258,8 @@ fn volumes_are_4096_texels_long() {
     }
 }
 
-/// Formats of three channels are sampled, and no input attachments: those are rendered to.
+/// Formats of three components can be sampled but cannot be input attachments, which need a format that can be rendered
+/// to.
 #[gaurast_runner::test]
 fn input_attachments_are_of_formats_that_are_rendered_to() {
     let gpu = own();
@@ -293,8 +294,8 @@ fn input_attachments_are_of_formats_that_are_rendered_to() {
     assert!(answer(vk::Format::D32_SFLOAT, sampled | input).is_ok());
 }
 
-/// A device of Vulkan 1.0 that enables push descriptors and update templates finds every command of both, and one that
-/// enables push descriptors alone finds those that push.
+/// A Vulkan 1.0 device that enables push descriptors and update templates has every command of both. One that enables
+/// push descriptors alone has the commands that push.
 #[gaurast_runner::test]
 fn commands_of_listed_extensions_are_found() {
     let entry = vulkan_gaurast::entry();

@@ -1,6 +1,6 @@
-//! Gaussian draws through the Vulkan loader: the shared library, found by its manifest.
+//! Gaussian draws through the Vulkan loader, with the shared library that its manifest names.
 //!
-//! The loader and the layers read the environment, so that each test runs in a process of its own.
+//! The loader and the layers read the environment, so each test runs in a process of its own.
 
 use std::ffi::CStr;
 
@@ -16,8 +16,8 @@ use gaurast_tests::scenes;
 
 const VALIDATION: &CStr = c"VK_LAYER_KHRONOS_validation";
 
-/// The validation layer's messages on valid Gaussian draws, since it does not know the extension: the message's id, a
-/// part of its text, and why.
+/// Messages that the validation layer gives on valid Gaussian draws, since it does not know the extension: the
+/// message's id, a part of its text, and the reason.
 const EXPECTED: &[[&str; 3]] = &[
     [
         "VUID_Undefined",
@@ -62,7 +62,7 @@ fn camera() -> GaussianCameraGAURAST<'static> {
     scenes::camera(SIZE[0], SIZE[1]).to_vulkan()
 }
 
-/// A picture that takes dynamic rendering, a render pass, indices and blending to draw.
+/// A picture that uses dynamic rendering, a render pass, indices and blending.
 fn picture(gpu: &Gpu) -> Vec<[f32; 4]> {
     let scene = scenes::cloud(31, 2000, 3);
     let on_device = GaussianScene::new(gpu, &scene);
@@ -105,7 +105,7 @@ fn picture(gpu: &Gpu) -> Vec<[f32; 4]> {
     target.read()
 }
 
-/// The picture that the driver draws which is linked into the test.
+/// The same picture from the driver that is linked into the test.
 fn embedded_picture() -> Vec<[f32; 4]> {
     picture(&Gpu::embedded(&Settings::default()).expect("a device"))
 }
@@ -130,7 +130,7 @@ fn the_validation_layer_says_what_is_expected(case: &Case) {
         let gpu = gpu.expect("this driver's device");
         let validated = picture(&gpu);
         let messages = gpu.messages();
-        // Layers of some versions say less.
+        // Layers of some versions give fewer messages.
         let unexpected: Vec<_> = messages
             .iter()
             .filter(|message| !EXPECTED.iter().any(|expected| is(message, expected)))

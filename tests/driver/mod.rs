@@ -1,5 +1,5 @@
-//! The driver as the Vulkan loader and its layers find it; and the limits, features and extensions that strangers' programs ask
-//! for, each held against what a program gets of it.
+//! Tests of the driver as the Vulkan loader and its layers use it, and of the limits, features and extensions that
+//! common programs ask for. Each is tested by a program that uses it.
 
 mod addresses;
 mod depth_clip;

@@ -1,4 +1,4 @@
-//! Passes with views: one draw renders every view to its layer, and no other layer is touched.
+//! Multiview: one draw renders each view to its layer, and no other layer changes.
 
 use ash::vk;
 use gaurast_testkit::{Bindings, Vertex};
@@ -12,12 +12,13 @@ use crate::triangles::devices::own;
 
 const SIDE: u32 = 8;
 const LAYERS: u32 = 7;
-/// What layers hold before a pass.
+/// The contents of layers before a pass.
 const BEFORE: f32 = 9.0;
-/// What a pass clears to.
+/// The clear value of a pass.
 const CLEARED: f32 = 5.0;
 
-/// The vertex shader's view in red, the fragment shader's in green; the triangle covers the left half.
+/// Shaders that write the view index: the vertex shader's in red, the fragment shader's in green. The triangle covers
+/// the left half.
 const VERTEX: &str = "
     #extension GL_EXT_multiview : require
     layout(location = 0) in vec4 position;
@@ -70,7 +71,7 @@ fn pixels(image: &Image) -> Vec<[[f32; 2]; 2]> {
         .collect()
 }
 
-/// The pixels of a layer that is no view, and those of one that was drawn to.
+/// The expected pixels: those of a layer that is not a view, and those of a layer that was drawn to.
 fn expected(mask: u32) -> Vec<[[f32; 2]; 2]> {
     (0..LAYERS)
         .map(|layer| match mask & (1 << layer) {
@@ -84,7 +85,7 @@ fn left_half() -> Vec<Vertex> {
     shapes::rectangle([-1.0, -1.0, 0.0, 1.0], 0.5, [1.0; 4])
 }
 
-/// A render pass of one attachment that is cleared, and subpasses of these views that render to it.
+/// A render pass with one attachment, which is cleared, and a subpass for each view mask.
 fn render_pass(gpu: &Gpu, masks: &[u32], second: bool) -> vk::RenderPass {
     let attachment = [vk::AttachmentDescription::default()
         .format(vk::Format::R32G32B32A32_SFLOAT)
@@ -189,7 +190,7 @@ fn run(
     }
 }
 
-/// What pipelines are made for: its size and formats count, its contents don't.
+/// A target that gives pipelines its size and formats. Its contents are not used.
 fn target(gpu: &Gpu) -> Target {
     let options = TargetOptions {
         size: [SIDE; 2],
@@ -231,7 +232,7 @@ fn render_passes_draw_every_view_to_its_layer() {
     }
 }
 
-/// Each view is cleared by the first subpass that has it, and kept by the others.
+/// The first subpass with a view clears it, and later subpasses keep its contents.
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn views_are_loaded_by_the_first_subpass_that_has_them() {
     let gpu = own();
@@ -316,8 +317,8 @@ fn input_attachments_are_read_in_the_view() {
     unsafe { gpu.device().destroy_render_pass(pass, None) };
 }
 
-/// Dynamic rendering with views; a clear within it is for all views, and a query counts their samples in the first of
-/// as many queries.
+/// Dynamic rendering with views. A clear within it applies to all views. A query of several views uses consecutive
+/// queries, the first of which counts the samples of all.
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn dynamic_rendering_has_views() {
     let gpu = own();

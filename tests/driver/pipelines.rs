@@ -1,4 +1,4 @@
-//! Pipelines that may not be compiled, and caches.
+//! Pipeline creation without compilation, and pipeline caches.
 
 use ash::vk;
 use gaurast_testkit::shader::{Stage, compile};
@@ -6,8 +6,8 @@ use gaurast_testkit::shader::{Stage, compile};
 use crate::GLSLANG;
 use crate::triangles::devices::own;
 
-/// A pipeline that would have to be compiled is not created where the application forbids it; the others are, unless it
-/// wants to stop at the first.
+/// A pipeline that needs compilation is not created if the application forbids compilation. The other pipelines of the
+/// call are created, unless early return is requested.
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn pipelines_that_may_not_be_compiled_are_not_created() {
     let gpu = own();

@@ -1,4 +1,5 @@
-//! Swapchains of headless surfaces, which every machine has: images are acquired, drawn to and presented as Vulkan says.
+//! Swapchains of headless surfaces, which need no window system: images are acquired, drawn to and presented as Vulkan
+//! requires.
 
 use ash::vk;
 
@@ -66,7 +67,8 @@ fn many_frames_are_presented_in_every_mode() {
     }
 }
 
-/// What is drawn to an image stays there when it is presented, and an image that is bound to its memory is the same.
+/// An image keeps its contents when it is presented, and another image that is bound to its memory has the same
+/// contents.
 #[gaurast_runner::test]
 fn images_hold_what_is_drawn_and_share_their_memory() {
     let presenter = headless();
@@ -149,11 +151,11 @@ fn what_is_no_swapchain_is_refused() {
     );
 }
 
-/// Without a window system the driver lists none.
+/// Without a window system, the driver lists no window surface extension.
 #[gaurast_runner::test(alone)]
 fn windows_are_there_with_their_systems_only() {
     let names = |entry: &ash::Entry| -> Vec<String> {
-        // SAFETY: the layer is none.
+        // SAFETY: no layer is named.
         let listed = unsafe { entry.enumerate_instance_extension_properties(None) };
         let listed = listed.expect("extensions");
         let names = listed

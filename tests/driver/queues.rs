@@ -1,12 +1,12 @@
-//! Queue families, and what a process may have of memory.
+//! Queue families, and the memory budget of a process.
 
 use ash::vk;
 use gaurast_testkit::{Buffer, Gpu};
 
 use crate::triangles::devices::own;
 
-/// Beside the family that does everything there are one for compute and one for copies; a queue of each does its work, and
-/// a semaphore hands it on.
+/// There are three families: one for everything, one for compute and one for transfers. A queue of each does its work,
+/// and a semaphore connects it with the next.
 #[gaurast_runner::test]
 fn families_of_compute_and_of_copies_work() {
     let entry = vulkan_gaurast::entry();
@@ -66,7 +66,7 @@ fn families_of_compute_and_of_copies_work() {
             device
                 .begin_command_buffer(commands, &begin)
                 .expect("it begins");
-            // Each overwrites what the ones before it have written to its left.
+            // Each submission overwrites the results of the earlier ones on its left.
             let size = 4 * (index as u64 + 1);
             device.cmd_fill_buffer(commands, buffer, 12 - size, 4, 10 + index as u32);
             device.end_command_buffer(commands).expect("it ends");
@@ -119,7 +119,7 @@ fn usage(gpu: &Gpu) -> (u64, u64) {
     (budget.heap_usage[0], budget.heap_budget[0])
 }
 
-/// What is allocated counts as used. (Other tests of the process allocate meanwhile, but not as much.)
+/// Allocated memory counts as used. (Other tests in the process allocate at the same time, but less than this.)
 #[gaurast_runner::test]
 fn budgets_tell_what_is_used() {
     let gpu = own();

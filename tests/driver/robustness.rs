@@ -1,4 +1,4 @@
-//! What is read and written beyond resources, and of descriptors that hold none.
+//! Robust access: reads and writes beyond resources, and through null descriptors.
 
 use ash::vk;
 use gaurast_testkit::shader::{Stage, compile};
@@ -14,7 +14,7 @@ fn robust() -> Gpu {
     Gpu::extended(&[ash::ext::robustness2::NAME], &mut features).expect("a device")
 }
 
-/// A set of one binding of each of these kinds, all null but the first, which is a whole storage buffer.
+/// A set of one binding for each descriptor type. All are null except the first, which is a whole storage buffer.
 fn set(
     gpu: &Gpu,
     kinds: &[vk::DescriptorType],
@@ -42,7 +42,7 @@ fn set(
         })
         .collect();
     let device = gpu.device();
-    // SAFETY: the create infos are valid, and what is null may be.
+    // SAFETY: the create infos are valid, and null descriptors are enabled.
     unsafe {
         let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
         let layout = device
@@ -101,7 +101,7 @@ fn words(buffer: &Buffer) -> Vec<u32> {
     bytemuck::pod_collect_to_vec(&buffer.read())
 }
 
-/// Descriptors of nothing read zero, have no size, and swallow what is written.
+/// Null descriptors read zero and have no size, and writes to them have no effect.
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn null_descriptors_read_zero() {
     use vk::DescriptorType as Kind;
@@ -148,8 +148,8 @@ fn null_descriptors_read_zero() {
     free(&gpu, set);
 }
 
-/// Beyond a descriptor's range, though not beyond its buffer, scalars read zero and keep what they are; a vector that
-/// lies across the end has what lies before it.
+/// Beyond a descriptor's range, but within its buffer, reads of scalars give zero and writes have no effect. A vector
+/// that crosses the end has the part before the end.
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn ranges_end_where_they_say() {
     let gpu = robust();

@@ -1,4 +1,4 @@
-//! Samplers: anisotropic filtering, the least and the greatest of texels, border colours of one's own.
+//! Samplers: anisotropic filtering, minimum and maximum reduction, custom border colours.
 
 use ash::vk;
 use gaurast_testkit::{Bindings, Buffer, Gpu, Image, ImageOptions, Kernel, Resource, Sampler};
@@ -6,7 +6,7 @@ use gaurast_testkit::{Bindings, Buffer, Gpu, Image, ImageOptions, Kernel, Resour
 use crate::GLSLANG;
 use crate::triangles::devices::own;
 
-/// What a kernel leaves that samples an image by `code`, which sets `found`.
+/// The result of a kernel that samples an image by `code`, which sets `found`.
 fn sampled(gpu: &Gpu, image: &Image, sampler: &vk::SamplerCreateInfo<'_>, code: &str) -> [f32; 4] {
     let sampler = Sampler::new(gpu, sampler);
     let result = Buffer::new(gpu, 16);
@@ -37,15 +37,16 @@ fn linear() -> vk::SamplerCreateInfo<'static> {
         .max_lod(vk::LOD_CLAMP_NONE)
 }
 
-/// Stripes across a footprint that is long and narrow: an isotropic sample takes a coarse level, where all stripes are gray; an
-/// anisotropic one takes as many samples along it as it is longer than wide, each of the level of its width.
+/// Stripes across a long and narrow footprint. An isotropic sample takes a coarse level, in which all stripes are gray.
+/// An anisotropic sample takes several samples along the footprint, as many as the ratio of length to width, each of
+/// the level of its width.
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn long_footprints_are_sampled_along_their_length() {
     let gpu = own();
     assert!(gpu.limits().max_sampler_anisotropy >= 16.0);
     assert_eq!(gpu.features().sampler_anisotropy, vk::TRUE);
     let side = 64u32;
-    // Level 0 has stripes along y that are 8 texels wide, and each level its number in green.
+    // Level 0 has stripes along y that are 8 texels wide. Each level has its number in green.
     let levels: Vec<Vec<[f32; 4]>> = (0..7)
         .map(|level| {
             let size = side >> level;
@@ -61,7 +62,7 @@ fn long_footprints_are_sampled_along_their_length() {
     let usage = vk::ImageUsageFlags::SAMPLED;
     let options = ImageOptions::new(vk::Format::R32G32B32A32_SFLOAT, [side; 2], usage);
     let image = Image::textured(gpu, &options, &levels);
-    // One texel wide along x, eight texels along y, in the middle of a white stripe.
+    // The footprint is one texel wide along x and eight texels long along y, in the middle of a white stripe.
     let code = "found = textureGrad(image, vec2(12.0, 32.5) / 64.0, vec2(1.0, 0.0) / 64.0, vec2(0.0, 8.0) / 64.0);";
     let isotropic = sampled(gpu, &image, &linear(), code);
     assert_eq!(isotropic[..2], [0.5, 3.0], "log2(8) is level 3");
@@ -72,18 +73,18 @@ fn long_footprints_are_sampled_along_their_length() {
     let full = with(16.0);
     assert!((full[0] - 1.0).abs() < 1e-5, "{full:?}");
     assert!(full[1].abs() < 1e-5, "of the width of one texel: {full:?}");
-    // Two samples at most are of footprints half as long, four texels: level 2.
+    // With at most two samples, each footprint is half as long: four texels, level 2.
     let half = with(2.0);
     assert!((half[1] - 2.0).abs() < 1e-5, "{half:?}");
     assert_eq!(with(1.0), isotropic);
-    // The long axis is followed, whichever it is: along x the samples lie on both kinds of stripes.
+    // The longer axis is used: along x the samples are on both kinds of stripes.
     let across = "found = textureGrad(image, vec2(16.0, 32.5) / 64.0, vec2(16.0, 0.0) / 64.0, vec2(0.0, 1.0) / 64.0);";
     let info = linear().anisotropy_enable(true).max_anisotropy(16.0);
     let across = sampled(gpu, &image, &info, across);
     assert!((across[0] - 0.5).abs() < 0.05, "{across:?}");
     assert!(across[1].abs() < 1e-5, "{across:?}");
     assert!((across[2] - 15.5).abs() < 1e-3, "centred: {across:?}");
-    // A footprint as wide as long is sampled once, with or without.
+    // A footprint that is as wide as long is sampled once, with or without anisotropy.
     let round = "found = textureGrad(image, vec2(13.25, 30.0) / 64.0, vec2(2.0, 0.0) / 64.0, vec2(0.0, 2.0) / 64.0);";
     let info = linear().anisotropy_enable(true).max_anisotropy(16.0);
     assert_eq!(
@@ -92,7 +93,7 @@ fn long_footprints_are_sampled_along_their_length() {
     );
 }
 
-/// The least and the greatest of the texels that have a weight, of one level and of two.
+/// The minimum and the maximum of the texels with a nonzero weight, of one level and of two.
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn samplers_take_the_least_and_the_greatest() {
     let gpu = own();
@@ -113,17 +114,17 @@ fn samplers_take_the_least_and_the_greatest() {
     let (least, greatest) = (vk::SamplerReductionMode::MIN, vk::SamplerReductionMode::MAX);
     assert_eq!(found(least, [0.5, 0.5], 0.0), 1.0);
     assert_eq!(found(greatest, [0.5, 0.5], 0.0), 9.0);
-    // On a row of texels' centres those of the other row have no weight.
+    // On the centres of a row of texels, the other row has no weight.
     assert_eq!(found(greatest, [0.5, 0.25], 0.0), 5.0);
     assert_eq!(found(least, [0.5, 0.75], 0.0), 3.0);
-    // Between levels, of both.
+    // Between two levels, the texels of both count.
     assert_eq!(found(greatest, [0.25, 0.25], 0.5), 7.0);
     assert_eq!(found(least, [0.25, 0.25], 0.5), 1.0);
     let mean = vk::SamplerReductionMode::WEIGHTED_AVERAGE;
     assert_eq!(found(mean, [0.5, 0.5], 0.0), 4.5);
 }
 
-/// Outside of an image lies the colour that the sampler was given, swizzled as texels are.
+/// Outside an image is the sampler's border colour, with the view's swizzle.
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn borders_have_any_colour() {
     let mut custom = vk::PhysicalDeviceCustomBorderColorFeaturesEXT::default()
@@ -159,7 +160,7 @@ fn borders_have_any_colour() {
     }
 }
 
-/// Formats of four bits a component are read in their own order.
+/// Formats of four bits per component are read in their own component order.
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn components_of_four_bits_have_their_places() {
     let gpu = own();

@@ -5,10 +5,10 @@ use std::ffi::CStr;
 
 use ash::vk;
 
-/// The size of pictures, unless a test wants another.
+/// The default size of pictures.
 pub const SIZE: [u32; 2] = [48, 32];
 
-/// What a swapchain is made of.
+/// The options of a swapchain.
 #[derive(Clone, Copy)]
 pub struct SwapchainOptions {
     pub size: [u32; 2],
@@ -41,10 +41,10 @@ pub struct Presenter {
     _entry: ash::Entry,
 }
 
-// SAFETY throughout: handles are used while they live, structures are valid, and what is submitted is waited for before
-// anything of it is destroyed.
+// SAFETY of all `unsafe` here: handles are used while they are valid, structures are valid, and a submission is waited
+// for before any of its objects is destroyed.
 impl Presenter {
-    /// A device of an instance with an extension of surfaces, and the surface that `create` makes.
+    /// Creates a device of an instance with a surface extension, and the surface, which `create` makes.
     pub fn new(
         entry: ash::Entry,
         extension: &CStr,
@@ -246,7 +246,7 @@ pub struct Swapchain<'a> {
 }
 
 impl Swapchain<'_> {
-    /// An image that may be drawn to, and if the swapchain no longer suits the window.
+    /// Acquires an image; the second value is true if the swapchain no longer matches the window exactly.
     pub fn acquire(&self, timeout: u64) -> Result<(u32, bool), vk::Result> {
         let device = &self.presenter.device;
         // SAFETY: see above.
@@ -269,7 +269,7 @@ impl Swapchain<'_> {
         }
     }
 
-    /// Presents an image, and tells if the swapchain no longer suits the window.
+    /// Presents an image; the value is true if the swapchain no longer matches the window exactly.
     pub fn present(&self, index: u32) -> Result<bool, vk::Result> {
         self.present_after(index, &[])
     }
@@ -296,7 +296,7 @@ impl Swapchain<'_> {
         presented
     }
 
-    /// Acquires an image, clears it to a colour, and presents it, each when the one before is done.
+    /// Acquires an image, clears it to a colour, and presents it, each step after the one before.
     pub fn frame(&self, color: [f32; 4]) -> (u32, Result<bool, vk::Result>) {
         let device = &self.presenter.device;
         // SAFETY: see above.
@@ -331,7 +331,7 @@ impl Swapchain<'_> {
         }
     }
 
-    /// An image of its own that is bound to the memory of one of the swapchain's.
+    /// Creates another image that is bound to the memory of one of the swapchain's images.
     pub fn alias(&self, index: u32) -> vk::Image {
         let [width, height] = self.size;
         let mut of_swapchain = vk::ImageSwapchainCreateInfoKHR::default().swapchain(self.raw);

@@ -1,5 +1,5 @@
-//! Windows of X11, on a server without a screen (Xvfb) that each test starts for itself: what is presented is what the window
-//! shows; windows change their size, go away, and so may the server.
+//! Windows of X11, on a server without a screen (Xvfb) that each test starts for itself. The window shows the presented
+//! pictures. Windows change their size and are destroyed, and the server may end.
 
 use std::io::Read;
 use std::process::{Child, Command, Stdio};
@@ -18,7 +18,7 @@ use super::window::{Presenter, SIZE, SwapchainOptions};
 
 const XVFB: Need = Need::Program("Xvfb");
 
-/// A server, which ends with the test.
+/// A server process, which ends with the test.
 struct Server {
     process: Child,
     display: String,
@@ -33,7 +33,7 @@ impl Server {
             .stderr(Stdio::null())
             .spawn()
             .expect("Xvfb starts");
-        // It writes its number when it is ready.
+        // The server writes its display number when it is ready.
         let mut output = process.stdout.take().expect("its output");
         let mut number = String::new();
         let mut byte = [0];
@@ -48,7 +48,7 @@ impl Server {
     }
 
     fn stop(&mut self) {
-        // It may have ended by itself.
+        // The process may have ended by itself.
         let _ = self.process.kill();
         let _ = self.process.wait();
     }
@@ -60,7 +60,7 @@ impl Drop for Server {
     }
 }
 
-/// A window on a connection of libxcb, as applications have it.
+/// A window on a connection of libxcb, as in applications.
 struct Window {
     id: u32,
     connection: XCBConnection,
@@ -130,7 +130,7 @@ impl Window {
     }
 }
 
-/// What another client of the server sees of a window of [`SIZE`]: blue, green and red of each pixel.
+/// The pixels that another client of the server reads from a window of [`SIZE`]: blue, green and red of each.
 fn shown(server: &Server, window: u32) -> Vec<[u8; 3]> {
     let (connection, _) = RustConnection::connect(Some(&server.display)).expect("a connection");
     let [width, height] = SIZE.map(|side| side as u16);
@@ -143,7 +143,7 @@ fn shown(server: &Server, window: u32) -> Vec<[u8; 3]> {
     pixels.map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect()
 }
 
-/// Waits until every pixel of a window is of a colour.
+/// Waits until every pixel of a window has a colour.
 fn assert_shown(server: &Server, window: u32, color: [u8; 3]) {
     let end = Instant::now() + Duration::from_secs(20);
     loop {
@@ -199,7 +199,7 @@ fn pictures_are_shown_through_the_connection() {
     what_is_presented_is_shown(&["-extension", "MIT-SHM"]);
 }
 
-/// 30 frames take half a second and no less where each waits for the display, of 60 Hz.
+/// 30 frames take at least half a second if each waits for the display, which runs at 60 Hz.
 #[gaurast_runner::test(needs = [XVFB])]
 fn frames_in_order_are_paced_by_the_display() {
     let server = Server::start(&[]);
@@ -212,7 +212,7 @@ fn frames_in_order_are_paced_by_the_display() {
     for _ in 0..33 {
         assert_eq!(swapchain.frame([0.5; 4]).1, Ok(false));
     }
-    // The last ones may still wait.
+    // The last frames may still be waiting.
     let seconds = begin.elapsed().as_secs_f64();
     assert!(seconds > 0.4, "{seconds} s");
 }
@@ -247,7 +247,7 @@ fn a_window_changes_its_size() {
     assert_shown(&server, window.id, [0, 0, 255]);
 }
 
-/// Presents until the surface is lost, which it must be soon.
+/// Presents until the surface is lost, which must happen soon.
 fn assert_lost(swapchain: &super::window::Swapchain<'_>) {
     let end = Instant::now() + Duration::from_secs(20);
     while swapchain.frame([0.5; 4]).1 != Err(vk::Result::ERROR_SURFACE_LOST_KHR) {

@@ -1,7 +1,7 @@
-//! What binary16 rasterization costs in exactness: `cargo run --release -p gaurast-tests --example binary16_error
-//! [SCENE FILE...]` prints a table.
+//! Prints a table of the errors of binary16 rasterization: `cargo run --release -p gaurast-tests --example
+//! binary16_error [SCENE FILE...]`.
 //!
-//! Each scene is drawn in binary16 and in binary32, and both are held against the binary64 oracle.
+//! Each scene is drawn in binary16 and in binary32, and both are compared with the binary64 oracle.
 
 use gaurast::vk::{GaussianPrecisionGAURAST, PipelineGaussianStateCreateInfoGAURAST};
 use gaurast_scene::camera::DEFAULT_FOV;
@@ -19,9 +19,9 @@ const SIZE: [u32; 2] = [640, 480];
 struct Figures {
     greatest: f64,
     mean: f64,
-    /// In dB, for a peak of 1.
+    /// The PSNR in dB, for a peak of 1.
     psnr: f64,
-    /// Share of pixels that differ by a level of 8 bits or more, in percent.
+    /// The percentage of pixels that differ by a level of 8 bits or more.
     visible: f64,
 }
 
@@ -75,8 +75,8 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     println!("# Errors of binary16 rasterization\n");
     println!(
-        "Pictures of {}x{} pixels against the binary64 oracle, over (C, 1 - T); written by \
-         `tests/examples/binary16_error.rs`.\n",
+        "Pictures of {}x{} pixels, compared with the binary64 oracle in all channels of (C, 1 - T). \
+         `cargo run --release -p gaurast-tests --example binary16_error` prints this page.\n",
         SIZE[0], SIZE[1]
     );
     println!(

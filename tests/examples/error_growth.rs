@@ -1,8 +1,8 @@
-//! How the error of Gaussian draws grows with what makes them hard: `error_growth [FOLDER]` writes a
-//! table (`error_growth.csv`) and a plot (`error_growth.svg`), into the current folder by default.
+//! Measures the growth of the error of Gaussian draws with the difficulty of the scene. `error_growth [FOLDER]` writes
+//! a table (`error_growth.csv`) and a plot (`error_growth.svg`), into the current folder by default.
 //!
-//! The error is the greatest distance of a channel of any pixel from the binary64 oracle's envelope,
-//! over several scenes, at the simplest and at the best SIMD level.
+//! The error is the greatest distance of a channel of any pixel from the binary64 oracle's envelope, over several
+//! scenes, at the simplest and at the best SIMD level.
 
 use std::error::Error;
 use std::fmt::Write as _;
@@ -22,19 +22,19 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 const SIZE: [u32; 2] = [131, 97];
-/// Scenes at each point of a sweep.
+/// The number of scenes at each point of a sweep.
 const SEEDS: u64 = 4;
 
 type State = PipelineGaussianStateCreateInfoGAURAST<'static>;
 
-/// A scene and how it is seen.
+/// A scene and its camera.
 struct View {
     gaussians: Vec<Gaussian>,
     camera: GaussianCameraGAURAST<'static>,
     state: State,
 }
 
-/// What is swept: its name, its values, and the view that one of them makes.
+/// A sweep: its name, its values, and a function that makes the view of a value.
 struct Sweep {
     name: &'static str,
     values: Vec<f64>,
@@ -80,7 +80,7 @@ fn layers(rng: &mut ChaCha8Rng, count: f64) -> View {
         position: [rng.random_range(-1.0..1.0), 0.0, 2.0 + index as f32 * 1e-3],
         scale: [20.0; 3],
         rotation: [1.0, 0.0, 0.0, 0.0],
-        // Half of the light passes through all of them together.
+        // All of them together let half of the light pass.
         opacity: (1.0 - 0.5f64.powf(1.0 / count as f64)).max(0.004) as f32,
         sh: vec![[0; 3].map(|_| rng.random_range(-1.7..1.7))],
     };
@@ -115,7 +115,7 @@ fn needles(rng: &mut ChaCha8Rng, ratio: f64) -> View {
 fn filterless(rng: &mut ChaCha8Rng, thinness: f64) -> View {
     let mut gaussians = cloud(rng, 400);
     for gaussian in &mut gaussians {
-        // In pixels the deviation across is one over the thinness.
+        // In pixels, the deviation across is the reciprocal of the thinness.
         let across = gaussian.position[2] / 105.0 / thinness as f32;
         gaussian.scale = [rng.random_range(0.3..3.0), across, across];
     }
@@ -213,7 +213,7 @@ fn errors(gpus: &[Gpu], view: &View) -> Vec<f64> {
 type Points = Vec<(f64, Vec<f64>)>;
 
 fn plot(path: &Path, results: &[(Sweep, Points)], levels: &[&str]) -> Result<(), Box<dyn Error>> {
-    // The font is one, since it is part of the program.
+    // Registering the font cannot fail, since it is part of the program.
     let font = epaint_default_fonts::UBUNTU_LIGHT;
     let _ = register_font("sans-serif", FontStyle::Normal, font);
     let root = SVGBackend::new(path, (1200, 700)).into_drawing_area();

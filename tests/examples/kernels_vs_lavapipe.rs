@@ -1,13 +1,13 @@
-//! Times real kernels on this driver and on lavapipe, run by run in turn, and prints the ratio of each.
+//! Times compute kernels on this driver and on lavapipe, alternating between them, and prints the ratio of each.
 //!
-//! Both get as many threads as there are processors, unless `GAURAST_THREADS` and `LP_NUM_THREADS` say otherwise; they
-//! should be set alike. `GAURAST_SIMD` chooses this driver's SIMD level.
+//! Both use one thread for each processor, unless `GAURAST_THREADS` and `LP_NUM_THREADS` are set; they should be set to
+//! the same number. `GAURAST_SIMD` selects this driver's SIMD level.
 
 use gaurast_tests::kernels::{Context, Prepared, Size, all};
 use std::error::Error;
 use std::time::{Duration, Instant};
 
-/// Runs of each kernel that are timed.
+/// The number of timed runs of each kernel.
 const RUNS: usize = 7;
 
 fn time(prepared: &Prepared) -> Result<Duration, Box<dyn Error>> {
@@ -38,7 +38,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut logarithms = Vec::new();
     for kernel in all(Size::Large) {
         let (ours, theirs) = (own.prepare(&kernel)?, lavapipe.prepare(&kernel)?);
-        // The first run touches memory, and is not counted.
+        // The first run touches memory for the first time, and is not counted.
         ours.run()?;
         theirs.run()?;
         let (mut our_times, mut their_times) = (Vec::new(), Vec::new());

@@ -1,5 +1,5 @@
-//! Draws 100,000 frames of tiny scenes that come again and again on one device, and checks that memory and pictures stay
-//! as they are: `long_run [FRAMES]`.
+//! Draws 100,000 frames of small, recurring scenes on one device, and checks that memory does not grow and that
+//! pictures are the same each time: `long_run [FRAMES]`.
 
 use gaurast_tests::long_run;
 

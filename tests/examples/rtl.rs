@@ -1,5 +1,6 @@
-//! Prints the module's table of `docs/simulator.md`: tiles drawn by Verilator beside the model's, and cycles by cause.
-//! `cargo run --profile checked -p gaurast-tests --example rtl -- FOLDER TILES [SCENE...]`; FOLDER keeps what is built.
+//! Prints the table of the SystemVerilog module in `docs/simulator.md`: tiles drawn by Verilator and by the model, and
+//! cycles by cause. `cargo run --profile checked -p gaurast-tests --example rtl -- FOLDER TILES [SCENE...]`; FOLDER
+//! keeps Verilator's build.
 
 #[path = "../simulator/tiles.rs"]
 #[allow(dead_code, reason = "the tests use more of it")]
@@ -17,7 +18,7 @@ fn main() -> std::io::Result<()> {
     };
     let count: usize = tiles.parse().map_err(std::io::Error::other)?;
     println!(
-        "| tiles | numbers | groups | tiles | pixels that differ | cycles | a pixel each | transmittance | memory | controller | modes |"
+        "| tiles | numbers | groups | count | differing pixels | cycles | busy | transmittance | memory | controller | modes |"
     );
     println!("|---|---|---|---:|---:|---:|---:|---:|---:|---:|---:|");
     let views: Vec<_> = scenes

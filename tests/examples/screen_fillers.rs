@@ -1,6 +1,6 @@
-//! A million Gaussians that each fill a screen of 8192x8192 pixels: 2.6e11 pairs of tile and Gaussian, far more than any
-//! list holds. `screen_fillers [COUNT [SIDE]]` draws them once and says how long that took and how much memory the process
-//! held at most.
+//! Draws a million Gaussians that each fill a target of 8192x8192 pixels: 2.6e11 pairs of tile and Gaussian, far more
+//! than a list can hold. `screen_fillers [COUNT [SIDE]]` draws them once and prints the time and the peak memory of the
+//! process.
 
 use gaurast::vk::GaussianCameraGAURAST;
 use gaurast_testkit::{
@@ -41,7 +41,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         "{count} Gaussians at {side}x{side}: {:.1} s",
         started.elapsed().as_secs_f64()
     );
-    // Where the system tells.
+    // Only Linux has this file.
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let peak = status.lines().find(|line| line.starts_with("VmHWM"));
     println!("{}", peak.unwrap_or("the system does not tell the memory"));

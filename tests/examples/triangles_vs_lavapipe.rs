@@ -1,14 +1,13 @@
-//! Times triangles on this driver and on lavapipe, run by run in turn, and prints the ratio of each
-//! workload, their geometric mean, and the most memory that a process of each device needs.
+//! Times triangles on this driver and on lavapipe, alternating between them. Prints the ratio of each workload, their
+//! geometric mean, and the peak memory of a process on each device.
 //!
-//! Both get as many threads as there are processors, unless `GAURAST_THREADS` and `LP_NUM_THREADS`
-//! say otherwise; they should be set alike. `--simd LEVEL` chooses this driver's SIMD level (as
-//! `GAURAST_SIMD` does), `--scene NAME` one workload, and `--no-memory` leaves out the processes
-//! that measure memory.
+//! Both use one thread for each processor, unless `GAURAST_THREADS` and `LP_NUM_THREADS` are set; they should be set to
+//! the same number. `--simd LEVEL` selects this driver's SIMD level (as `GAURAST_SIMD` does), `--scene NAME` selects
+//! one workload, and `--no-memory` omits the measurement of memory.
 //!
-//! `--runs-of DEVICE NAME TIMES BY` does a workload so many times and says nothing, with width,
-//! height and numbers of triangles divided by `BY`: for counts of instructions, which are those
-//! of more runs less those of fewer. DEVICE is `own` or `lavapipe`.
+//! `--runs-of DEVICE NAME TIMES BY` runs a workload TIMES times and prints nothing, with width, height and numbers of
+//! triangles divided by `BY`. It is for counting instructions: the difference of two counts with different TIMES is the
+//! cost of the additional runs. DEVICE is `own` or `lavapipe`.
 
 use std::error::Error;
 use std::process::Command;
@@ -18,13 +17,13 @@ use gaurast_testkit::Gpu;
 use gaurast_testkit::Settings;
 use gaurast_tests::triangles::workloads::{NAMES, Workload};
 
-/// Runs of each workload that are timed.
+/// The number of timed runs of each workload.
 const RUNS: usize = 7;
 
-/// Given to a process that only measures memory: the device, and the workload.
+/// The argument of a process that only measures memory; the device and the workload follow.
 const MEMORY: &str = "--memory-of";
 
-/// Given to a process that only does a workload, for counts.
+/// The argument of a process that only runs a workload, for counts.
 const RUNS_OF: &str = "--runs-of";
 
 type Failure = Box<dyn Error>;
@@ -47,7 +46,7 @@ fn open(device: &str) -> Result<Gpu, Failure> {
     })
 }
 
-/// The most memory that this process has had, in MiB, as Linux counts it.
+/// The peak memory of this process in MiB, as Linux reports it.
 fn peak_memory() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
@@ -55,7 +54,7 @@ fn peak_memory() -> Option<f64> {
     Some(kibibytes / 1024.0)
 }
 
-/// The peak of a process that does a workload twice on one device.
+/// The peak memory of a process that runs a workload twice on one device.
 fn memory_of(device: &str, name: &str) -> Option<f64> {
     let output = Command::new(std::env::current_exe().ok()?)
         .args([MEMORY, device, name])
@@ -64,7 +63,7 @@ fn memory_of(device: &str, name: &str) -> Option<f64> {
     String::from_utf8_lossy(&output.stdout).trim().parse().ok()
 }
 
-/// What [`memory_of`] starts.
+/// The main function of the process that [`memory_of`] starts.
 fn measure_memory(device: &str, name: &str) -> Result<(), Failure> {
     let gpu = open(device)?;
     let workload = Workload::new(&gpu, name)?;
@@ -74,7 +73,7 @@ fn measure_memory(device: &str, name: &str) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Does a smaller workload some times.
+/// Runs a smaller workload `times` times.
 fn run(device: &str, name: &str, times: &str, by: &str) -> Result<(), Failure> {
     let gpu = open(device)?;
     let workload = Workload::smaller(&gpu, name, by.parse()?)?;
@@ -84,7 +83,7 @@ fn run(device: &str, name: &str, times: &str, by: &str) -> Result<(), Failure> {
 
 fn compare(own: &Gpu, lavapipe: &Gpu, name: &str, with_memory: bool) -> Result<f64, Failure> {
     let (ours, theirs) = (Workload::new(own, name)?, Workload::new(lavapipe, name)?);
-    // The first run touches memory, and is not counted.
+    // The first run touches memory for the first time, and is not counted.
     ours.run();
     theirs.run();
     let (mut our_times, mut their_times) = (Vec::new(), Vec::new());

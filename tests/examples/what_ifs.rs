@@ -1,5 +1,5 @@
-//! Prints what each of the device's skips would bring as hardware (`simdevice/timing/studies/WHAT_IF.md`). `what_ifs FOLDER` writes
-//! pictures of the scenes, too.
+//! Prints the saving of each of the device's skips as hardware (`simdevice/timing/studies/WHAT_IF.md`). `what_ifs
+//! FOLDER` also writes pictures of the scenes.
 
 use gaurast_testkit::for_people;
 

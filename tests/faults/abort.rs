@@ -1,5 +1,6 @@
-//! The standard library aborts where an allocation fails that nobody asks about. So that there is no such one of any
-//! size, the host's allocator itself fails here, once in each of many processes, while the driver executes.
+//! The standard library aborts if an allocation fails that has no error handling. This test shows that there is no such
+//! allocation above a certain size: the host's allocator fails here, once in each of many processes, while the driver
+//! executes.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicBool, AtomicI64, Ordering::Relaxed};
@@ -13,11 +14,11 @@ use gaurast_testkit::{
 
 use super::scenarios;
 
-/// Bytes from which on an allocation may fail. Less is of a size that no application chooses.
+/// The size in bytes from which an allocation may fail. Smaller sizes do not depend on an application.
 const LARGE: usize = 64 << 10;
-/// Says to a process of this test which allocation fails in it.
+/// The variable that tells a process of this test which allocation fails.
 const VARIABLE: &str = "GAURAST_TEST_FAIL";
-/// Printed by such a process if it had no such allocation.
+/// The output of such a process if it had no such allocation.
 const NONE: &str = "none failed";
 
 struct Failing;
@@ -35,7 +36,7 @@ unsafe impl GlobalAlloc for Failing {
         if fails(layout.size()) {
             return std::ptr::null_mut();
         }
-        // SAFETY: the caller's promise.
+        // SAFETY: the caller guarantees it.
         unsafe { System.alloc(layout) }
     }
 
@@ -43,7 +44,7 @@ unsafe impl GlobalAlloc for Failing {
         if fails(layout.size()) {
             return std::ptr::null_mut();
         }
-        // SAFETY: the caller's promise.
+        // SAFETY: the caller guarantees it.
         unsafe { System.alloc_zeroed(layout) }
     }
 
@@ -51,12 +52,12 @@ unsafe impl GlobalAlloc for Failing {
         if fails(size) {
             return std::ptr::null_mut();
         }
-        // SAFETY: the caller's promise.
+        // SAFETY: the caller guarantees it.
         unsafe { System.realloc(pointer, layout, size) }
     }
 
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the caller's promise.
+        // SAFETY: the caller guarantees it.
         unsafe { System.dealloc(pointer, layout) }
     }
 }
@@ -68,7 +69,7 @@ fn arm(armed: bool) {
     ARMED.store(armed, Relaxed);
 }
 
-/// Many triangles that hide one another, some of them clipped, with four samples and a resolve.
+/// Draws many overlapping triangles, some of them clipped, with four samples and a resolve.
 fn draw_triangles(gpu: &Gpu, count: usize) {
     let target = Target::new(
         gpu,
@@ -110,7 +111,7 @@ fn draw_triangles(gpu: &Gpu, count: usize) {
     arm(false);
 }
 
-/// Fails the `n`th allocation while large draws of a scenario are executed; whoever started the process sees how it ends.
+/// Fails the `n`th allocation while large draws of a scenario are executed. The parent process checks the result.
 fn fail_one(scenario: &str, n: i64) {
     LEFT.store(n, Relaxed);
     let settings = Settings {
@@ -164,7 +165,7 @@ fn no_large_allocation_aborts(case: &Case) {
         if stdout.contains(NONE) {
             break;
         }
-        // It may have done without; else it was told.
+        // The driver either worked without the memory or reported the failure.
         let told = stderr.contains("ERROR_DEVICE_LOST") || stderr.contains("OUT_OF");
         assert!(
             output.status.code().is_some() && (output.status.success() || told),

@@ -1,6 +1,6 @@
-//! Memory that isn't there: allocations that depend on an application's sizes fail, one in each run, and each time the
-//! application gets a result that says so, or its device is lost with a message. Nothing panics, nothing aborts, and
-//! unless the device is lost, it draws the same picture afterwards.
+//! Out-of-memory tests. Allocations whose size depends on an application fail, one in each run. Each time the
+//! application gets an out-of-memory result, or its device is lost with a message. Nothing panics or aborts, and unless
+//! the device is lost, it draws the same picture afterwards.
 
 mod abort;
 mod results;
@@ -16,26 +16,26 @@ use results::{LOST, RESULTS};
 use scenarios::{Opened, Scenario, Use};
 use simdevice::host::injection;
 
-/// Panics since the last look: their messages, in whatever thread.
+/// The messages of panics in any thread since the last check.
 static PANICS: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
-/// Allocations of a scenario that are failed one by one; beyond them ever fewer.
+/// The number of allocations of a scenario that are failed one by one; later ones are sampled ever more sparsely.
 const EACH: u64 = 40;
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Runs of a scenario by how they ended: with each of [`RESULTS`], or with the picture all the same.
+/// Counts of a scenario's runs by their end: each of [`RESULTS`], or the correct picture.
 #[derive(Debug, Default)]
 struct Ended {
     failed: [u32; RESULTS.len()],
     succeeded: u32,
 }
 
-/// Uses a device. Returns what it made, or which of [`RESULTS`] it gave up at.
+/// Uses a device. Returns the picture, or the index in [`RESULTS`] of the error.
 fn attempt(used: &Use) -> Result<Vec<u8>, usize> {
-    // The scenario is an application that panics at the first error, and so does nothing else in this process.
+    // The scenario is an application that panics at the first error. Nothing else in this process does.
     let outcome = catch_unwind(AssertUnwindSafe(used));
     let panics = std::mem::take(&mut *lock(&PANICS));
     match outcome {
@@ -72,7 +72,7 @@ fn fail_each(scenario: &Scenario) -> Ended {
                 };
                 assert!(as_it_should, "{}, {n}", scenario.name);
             }
-            // What was not made for it to be faster was done without.
+            // The driver works without memory that only serves speed.
             Ok(picture) => {
                 ended.succeeded += 1;
                 assert!(picture == expected, "{}, {n}", scenario.name);
@@ -111,7 +111,7 @@ fn every_allocation_may_fail(case: &Case) {
     }
 }
 
-/// Scenarios are to end in every result, each in one at least.
+/// Every result must occur in at least one scenario.
 #[gaurast_runner::test]
 fn every_result_is_asked_for() {
     let scenarios = scenarios::all();
@@ -127,7 +127,7 @@ fn every_result_is_asked_for() {
     assert_eq!(asked.len(), RESULTS.len());
 }
 
-/// The table of `ALLOCATIONS.md` names the files that allocate through `devmem::host`, and no others.
+/// The table of `ALLOCATIONS.md` lists exactly the files that allocate through `devmem::host`.
 #[gaurast_runner::test]
 fn every_place_is_listed() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
@@ -157,7 +157,7 @@ fn every_place_is_listed() {
     assert_eq!(listed, found);
 }
 
-/// Reports whether a source file allocates through `devmem::host`, its tests aside.
+/// Returns true if a source file allocates through `devmem::host`, outside its tests.
 fn allocates(text: &str) -> bool {
     const FUNCTIONS: [&str; 10] = [
         "reserve",

@@ -1,6 +1,6 @@
-//! Results of calls for which there is no memory.
+//! The results of calls that fail for lack of memory.
 
-/// What a call's failure is called, where an application expected success.
+/// The names of the results.
 pub const RESULTS: [&str; 3] = [
     "ERROR_OUT_OF_HOST_MEMORY",
     "ERROR_OUT_OF_DEVICE_MEMORY",

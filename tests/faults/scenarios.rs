@@ -1,4 +1,4 @@
-//! What is done while memory is wanting.
+//! The scenarios that run while allocations fail.
 
 use gaurast::vk::{
     GaussianCameraGAURAST, GaussianCameraModelGAURAST, GaussianGeometryGAURAST,
@@ -17,22 +17,23 @@ use super::results::{DEVICE_MEMORY, HOST_MEMORY, LOST};
 /// The compiler of the triangles' shaders.
 pub const GLSLANG: Need = Need::Program("glslangValidator");
 
-/// Uses a device: returns what it made, or panics with the result of the call that failed.
+/// A function that uses a device: it returns the picture, or panics with the result of the call that failed.
 pub type Use = Box<dyn Fn() -> Vec<u8>>;
 
-/// When a scenario's device is opened.
+/// The time at which a scenario's device is opened.
 pub enum Opened {
-    /// Before it is used, so that it is the same each time.
+    /// Once before all uses, so that all have the same device.
     Before,
     /// Each time that it is used.
     Within,
 }
 
-/// Opens a device; what it returns may be called several times.
+/// Opens a device and returns a function that may be called several times.
 pub struct Scenario {
     pub name: String,
     pub device: Opened,
-    /// The results that some runs end in, by their places in [`RESULTS`](super::results::RESULTS). Others may be, too.
+    /// The results, as indices of [`RESULTS`](super::results::RESULTS), in which some runs must end. Others may occur
+    /// too.
     pub results: &'static [usize],
     pub open: Box<dyn Fn() -> Use>,
 }
@@ -61,7 +62,7 @@ const TRIANGLES: [&str; 14] = [
     "input_attachments",
 ];
 
-/// All of them.
+/// All scenarios.
 pub fn all() -> Vec<Scenario> {
     let opening = scenario("opening a device", || {
         Box::new(|| {
@@ -116,7 +117,7 @@ fn scenario(name: &str, open: impl Fn() -> Use + 'static) -> Scenario {
     }
 }
 
-/// How Gaussians are drawn.
+/// The mode of a draw of Gaussians.
 #[derive(Clone, Copy)]
 struct Gaussians {
     name: &'static str,
@@ -135,7 +136,7 @@ impl Default for Gaussians {
 }
 
 impl Gaussians {
-    /// The modes that keep lists of their own.
+    /// The modes that have lists of their own.
     fn all() -> [Self; 5] {
         let state = PipelineGaussianStateCreateInfoGAURAST::default();
         let plain = Self::default();
@@ -184,7 +185,7 @@ pub fn scene(count: usize) -> SceneBuffers {
     SceneBuffers::new(0, (0..count).map(one))
 }
 
-/// Draws a scene three times, so that it is put into chunks on the way. `drawing` is told when it begins and ends.
+/// Draws a scene three times, so that the driver builds chunks. `drawing` is called when this begins and when it ends.
 pub fn draw(
     context: &Gpu,
     buffers: &SceneBuffers,
@@ -209,7 +210,7 @@ fn draw_as(
     let scene = GaussianScene::new(context, buffers);
     let target = Target::floats(context, size);
     let focal_length = match how.model {
-        // Pixels in a radian; the picture is the whole way round.
+        // The focal length in pixels per radian; the picture covers the full circle.
         GaussianCameraModelGAURAST::EQUIRECTANGULAR => size[0] as f32 / std::f32::consts::TAU,
         _ => 0.8 * size[0] as f32,
     };

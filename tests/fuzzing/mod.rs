@@ -1,8 +1,9 @@
-//! Deterministic runs of the fuzz targets (see `tests/fuzz`): scene files, Vulkan calls, packets and shader modules from
-//! bytes that are random, or seeds that are changed at random. Nothing panics, in whatever thread.
+//! Deterministic runs of the fuzz targets (see `tests/fuzz`): scene files, Vulkan calls, packets and shader modules,
+//! from random bytes or from seeds that are changed at random. No thread may panic.
 //!
-//! `GAURAST_FUZZ_RUNS` says how many of each; the numbers of a failure's message make it happen again alone:
-//! `GAURAST_FUZZ_RUNS=1 GAURAST_FUZZ_FIRST=n`. Panics are the process's, and runs are shared by several processes.
+//! `GAURAST_FUZZ_RUNS` sets the number of runs of each target. To repeat a single failure, take its number n from the
+//! message: `GAURAST_FUZZ_RUNS=1 GAURAST_FUZZ_FIRST=n`. Panics are recorded per process, and several processes share
+//! the runs.
 
 mod shader_modules;
 mod watch;
@@ -18,7 +19,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use watch::{are_many, panics, runs, watch_panics};
 
-/// The files that fuzzing of a target begins with.
+/// The seed files of a fuzz target.
 fn corpus(name: &str) -> Vec<Vec<u8>> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("fuzz/corpus")
@@ -34,7 +35,7 @@ fn corpus(name: &str) -> Vec<Vec<u8>> {
         .collect()
 }
 
-/// Runs a target on a shard's seeds, then on changed ones and on random bytes of up to `longest`.
+/// Runs a target on a shard's seeds, then on changed seeds and on random bytes of at most `longest`.
 fn fuzz(
     case: &Case,
     runs: Range<u64>,
@@ -60,7 +61,7 @@ fn fuzz(
             let (seed, other) = (pick(&mut random), pick(&mut random));
             mutate_bytes(&mut random, &seed, &other)
         };
-        // A panic of this thread is no less one.
+        // A panic of this thread counts as well.
         let ran = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| target(&data)));
         let panics = panics();
         assert!(ran.is_ok() && panics.is_empty(), "run {run}: {panics:?}");
@@ -119,6 +120,6 @@ fn calls_succeed_or_fail(case: &Case) {
         !are_many(&runs) || succeeded > failed && submitted > 0,
         "{succeeded} succeeded, {failed} failed, {submitted} submitted"
     );
-    // What is against the rules is refused where it is recorded, with a message, and nothing here takes long.
+    // Invalid usage is refused with a message when it is recorded, and no command takes long, so no device may be lost.
     assert_eq!(lost, [""; 0], "devices were lost");
 }

@@ -1,5 +1,6 @@
-//! Modules whose bytes and instructions are changed at random go through pipeline creation and a dispatch: each is
-//! refused, runs, or loses its device in time; nothing panics, and nothing outside the bound ranges is written.
+//! Modules whose bytes and instructions are changed at random go through pipeline creation and a dispatch. Each is
+//! refused, runs, or loses its device within the time limit. Nothing panics, and nothing outside the bound ranges is
+//! written.
 
 use std::path::Path;
 
@@ -12,7 +13,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::watch::{are_many, panics, runs, watch_panics};
 
-/// The kept compute shaders that use buffers alone, and some of random control flow.
+/// The checked-in compute shaders that use only buffers, and some with random control flow.
 fn seeds() -> Vec<(String, Vec<u32>, Layout)> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../driver/spirv/tests/shaders");
     let mut names: Vec<_> = std::fs::read_dir(folder)
@@ -40,7 +41,7 @@ fn seeds() -> Vec<(String, Vec<u32>, Layout)> {
         .collect()
 }
 
-/// Modules that fuzzing found to be of interest. What they ask for that isn't there is not bound.
+/// Modules that fuzzing has found. Descriptors that the test cannot provide are not bound.
 fn found() -> Vec<(String, Vec<u32>)> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus/shader_modules");
     let mut paths: Vec<_> = std::fs::read_dir(folder)
@@ -62,7 +63,7 @@ fn found() -> Vec<(String, Vec<u32>)> {
 #[gaurast_runner::test(each = shards(4))]
 fn mutated_modules_never_panic_and_never_write_elsewhere(case: &Case) {
     if !case.is_alone() {
-        // Loops without end are many.
+        // Many modules have infinite loops, so the time limit is short.
         return case.run_alone(|command| {
             command.env("GAURAST_TIMEOUT_MS", "20");
         });

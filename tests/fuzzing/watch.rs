@@ -1,14 +1,14 @@
-//! How many runs there are, and what panics in them.
+//! The number of runs, and the panics in them.
 
 use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 
 use gaurast_runner::Case;
 
-/// What panicked, in whatever thread: the driver catches panics, so that an application never sees them.
+/// The messages of panics in any thread. The driver catches panics, so that an application never sees them.
 static PANICS: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
-/// Keeps all panics of this process from now on, and prints them with where they come from.
+/// Records all panics of this process from now on, and prints them with their backtraces.
 pub fn watch_panics() {
     std::panic::set_hook(Box::new(|info| {
         eprintln!("{info}\n{}", std::backtrace::Backtrace::force_capture());
@@ -22,7 +22,7 @@ pub fn panics() -> Vec<String> {
     std::mem::take(&mut *PANICS.lock().unwrap_or_else(PoisonError::into_inner))
 }
 
-/// The numbers of the runs that are a shard's, of as many as `GAURAST_FUZZ_RUNS` says, or `usual`.
+/// The numbers of a shard's runs. The total is `GAURAST_FUZZ_RUNS`, or `usual`.
 pub fn runs(case: &Case, usual: u64) -> Range<u64> {
     let number = |variable, otherwise| match std::env::var(variable) {
         Ok(text) => text.parse().expect("a number"),
@@ -33,7 +33,7 @@ pub fn runs(case: &Case, usual: u64) -> Range<u64> {
     first + start..first + end
 }
 
-/// Reports whether so many runs are enough for all outcomes.
+/// Returns true if there are enough runs for all outcomes to occur.
 pub fn are_many(runs: &Range<u64>) -> bool {
     runs.end - runs.start >= 100
 }

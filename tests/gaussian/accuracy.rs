@@ -1,5 +1,5 @@
-//! Gaussian draws through the driver against the binary64 oracle, at every SIMD level, with one
-//! worker thread and with two: the accuracy contract.
+//! The accuracy contract: Gaussian draws through the driver, compared with the binary64 oracle, at every SIMD level,
+//! with one worker thread and with two.
 
 use std::sync::Arc;
 
@@ -21,7 +21,7 @@ use glam::DVec3;
 
 use super::{PLAYBOT, SKULL};
 
-/// A trained scene of the real data.
+/// A trained scene of the test data.
 pub(crate) const PLANT: &str = "splats/plant.splat";
 
 pub(crate) type State = PipelineGaussianStateCreateInfoGAURAST<'static>;
@@ -45,8 +45,8 @@ impl<'a> Devices<'a> {
         Self { level, gpus }
     }
 
-    /// Draws `scene` in `state` from each of `views` on both devices and judges the pictures. Levels share the oracle's,
-    /// which `name` and a view's name tell apart.
+    /// Draws `scene` in `state` from each of `views` on both devices and judges the pictures. All levels share the
+    /// oracle's pictures, which are identified by `name` and the view's name.
     pub(crate) fn judge(&self, name: &str, scene: &SceneBuffers, state: State, views: &[View]) {
         let [images, same] = self
             .gpus
@@ -78,7 +78,7 @@ fn reference(name: &str, scene: &SceneBuffers, state: State, view: &View) -> Arc
     })
 }
 
-/// Where a scene is seen from, and how its picture is judged.
+/// A view of a scene, and the limits by which its picture is judged.
 pub(crate) struct View {
     pub(crate) name: String,
     pub(crate) camera: GaussianCameraGAURAST<'static>,
@@ -95,7 +95,7 @@ pub(crate) fn draw(
 ) -> Vec<Vec<[f32; 4]>> {
     let options = GaussianOptions {
         state,
-        // The device draws degree 3 at most; the oracle is asked for no more.
+        // The device draws at most degree 3 here, so the oracle gets no more.
         ..GaussianOptions::new(scene.degree)
     };
     let pipeline = GaussianPipeline::new(gpu, &options);
@@ -139,7 +139,7 @@ pub(crate) fn states() -> [(&'static str, State); 4] {
     ]
 }
 
-/// Odd, so that tiles are cut.
+/// The picture's size; odd, so that tiles are cut.
 pub(crate) const SIZE: [u32; 2] = [211, 157];
 
 /// The view of a generated scene.
@@ -170,7 +170,7 @@ fn generated_scenes_keep_the_contract_in_every_state(case: &Case) {
     }
 }
 
-/// Views of a generated scene by cameras that are no pinholes, one of them with Gaussians behind it.
+/// Views of a generated scene by cameras of the other models, one of them with Gaussians behind it.
 fn other_cameras() -> Vec<View> {
     let size = [211, 157];
     let view = |name: &str, camera| View {
@@ -207,7 +207,7 @@ fn other_cameras() -> Vec<View> {
                 .focal_length([60.0, 45.0])
                 .principal_point([180.0, 70.0]),
         ),
-        // More than three periods wide.
+        // The picture is more than three periods wide.
         view(
             "panorama, many times around",
             panorama.focal_length([9.0, 40.0]),
@@ -243,7 +243,7 @@ fn unscented_projection_keeps_the_contract_through_every_camera(case: &Case) {
     let state = State::default().linearization(GaussianLinearizationGAURAST::UNSCENTED);
     let compensated = state.antialiasing(GaussianAntialiasingGAURAST::OPACITY_COMPENSATED);
     let mut scene = scenes::cloud(13, 2000, 1);
-    // Large ones make a difference.
+    // Large Gaussians show the difference.
     for scale in scene.scales.iter_mut().step_by(5) {
         *scale = scale.map(|s| 8.0 * s);
     }
@@ -282,7 +282,7 @@ fn orders_give_different_pictures() {
 #[gaurast_runner::test(each = simd_levels())]
 fn awkward_scenes_stay_within_the_envelope_in_every_state(case: &Case) {
     let devices = Devices::new(case.variant());
-    // Few at a time: a huge opaque one hides the others.
+    // Few Gaussians per scene, because a huge opaque one hides the others.
     for seed in 100..160 {
         let scene = scenes::awkward(seed, 10 + 2 * (seed % 20) as usize, (seed % 4) as u32);
         for (name, state) in states() {
@@ -297,8 +297,7 @@ fn awkward_scenes_stay_within_the_envelope_in_every_state(case: &Case) {
     }
 }
 
-/// The cameras that real scenes are seen by: the whole of it, a side of it from nearby, and one in
-/// its middle.
+/// The views of trained scenes: the whole scene, a side of it from nearby, and the view from its middle.
 pub(crate) fn views(scene: &Scene) -> Vec<View> {
     let (centre, radius) = bulk(scene);
     let look = |from: [f64; 3], to: [f64; 3], fov, size| {
@@ -326,7 +325,7 @@ pub(crate) fn views(scene: &Scene) -> Vec<View> {
         .collect()
 }
 
-/// The middle of a scene's opaque Gaussians and the distance within which half of them are.
+/// The centre of a scene's opaque Gaussians, and the distance from it within which half of them are.
 fn bulk(scene: &Scene) -> (DVec3, f64) {
     let opaque: Vec<DVec3> = scene
         .positions()
@@ -348,7 +347,7 @@ fn bulk(scene: &Scene) -> (DVec3, f64) {
     )
 }
 
-/// Judges the pictures of a file.
+/// Judges the pictures of a scene file.
 fn file_keeps_the_contract(case: &Case, name: &'static str) {
     let scene = gaurast_scene::open(data(name)).expect("a scene");
     let views = views(&scene);

@@ -1,5 +1,5 @@
-//! What a pipeline lets the device leave inexact, against the binary64 oracle: no further off than the extension says,
-//! but off, and the same for any number of threads.
+//! The approximations that a pipeline allows, compared with the binary64 oracle. The error is within the extension's
+//! bound, it is not zero, and it is the same for any number of threads.
 
 use gaurast::vk::{
     PipelineGaussianApproximationStateCreateInfoGAURAST as Approximation,
@@ -13,13 +13,13 @@ use gaurast_tests::oracle::spherical_harmonics::{coefficient_count, color};
 use gaurast_tests::oracle::{OracleState, Reference, render_bounded};
 use gaurast_tests::scenes::{self, Gaussian, SceneBuffers};
 
-/// Not whole tiles.
+/// The picture's size; not a multiple of a tile.
 const SIZE: [u32; 2] = [203, 139];
 
-/// What the contract allows without any approximation.
+/// The distance that the contract allows without approximations.
 const CONTRACT: f64 = 5e-6;
 
-/// A wall of faint discs, as wide as the picture, layer behind layer; bright and dark ones by turns.
+/// Several layers of faint discs that cover the picture, alternately bright and dark.
 fn layers() -> SceneBuffers {
     let discs = (0..300).map(|layer| {
         let look = if layer % 2 == 0 { 1.5 } else { -1.5 };
@@ -34,7 +34,7 @@ fn layers() -> SceneBuffers {
     SceneBuffers::new(0, discs)
 }
 
-/// The generated scene of the benchmarks, before the camera of the others.
+/// The generated scene of the benchmarks, at the camera of the other scenes.
 fn benchmark() -> SceneBuffers {
     let mut scene = SceneBuffers::from(&scenes::synthetic(1, 20_000));
     for [_, _, z] in &mut scene.positions {
@@ -52,7 +52,7 @@ fn all_scenes() -> [(&'static str, SceneBuffers); 4] {
     ]
 }
 
-/// A picture, with the approximation's structure if that is given.
+/// Draws a picture, with the approximation's structure if `allowed` is given.
 fn draw(gpu: &Gpu, scene: &SceneBuffers, allowed: Option<[f32; 2]>) -> Vec<[f32; 4]> {
     let [error, budget] = allowed.unwrap_or_default();
     let approximation = Approximation::default()
@@ -97,8 +97,8 @@ fn gpu(threads: usize) -> Gpu {
     .expect("a device")
 }
 
-/// How far each pixel lies outside of the oracle's envelope, where `range` is the range of colours: of it for colours,
-/// as it is for alpha.
+/// The distance of each pixel outside the oracle's envelope: of colours as a share of `range`, the range of colours,
+/// and of alpha as it is.
 fn distances(image: &[[f32; 4]], reference: &Reference, range: f64) -> Vec<f64> {
     let distance = |(index, pixel): (usize, &[f32; 4])| {
         let (least, greatest) = reference.envelope(index);
@@ -114,7 +114,7 @@ fn distances(image: &[[f32; 4]], reference: &Reference, range: f64) -> Vec<f64> 
     image.iter().enumerate().map(distance).collect()
 }
 
-/// The greatest component of a Gaussian's colour; black is behind all, and none is less.
+/// The greatest component of a Gaussian's colour. The background is black, and no colour is less.
 fn range(scene: &SceneBuffers) -> f64 {
     let coefficients = coefficient_count(scene.degree);
     let eye = scenes::camera(SIZE[0], SIZE[1]).eye;
@@ -133,7 +133,7 @@ fn range(scene: &SceneBuffers) -> f64 {
 fn pictures_are_no_further_off_than_is_allowed() {
     let gpu = gpu(2);
     let state = State::default();
-    // Where a pixel is finished before the Gaussian that would leave less than the floor, so much light may be left.
+    // A pixel ends before the Gaussian that would leave less than the floor, so this much transmittance may remain.
     let finished = f64::from(state.transmittance_floor) / (1.0 - f64::from(state.alpha_ceiling));
     for (scene_name, scene) in all_scenes() {
         let (reference, range) = (reference(&scene), range(&scene));
@@ -147,7 +147,7 @@ fn pictures_are_no_further_off_than_is_allowed() {
         ] {
             let image = draw(&gpu, &scene, Some(allowed));
             let name = format!("{scene_name}, {allowed:?}");
-            // In a small picture few blocks of sparse scenes run out of light, and what is awkward may hide all behind
+            // A sparse scene in a small picture has few saturated blocks. The awkward scene may hide everything behind
             // alphas at the ceiling.
             let must_differ = match scene_name {
                 "layers" => true,
@@ -162,7 +162,8 @@ fn pictures_are_no_further_off_than_is_allowed() {
             let distances = distances(&image, &reference, range);
             let worst = distances.iter().copied().fold(0.0, f64::max);
             let flipped = distances.iter().filter(|distance| **distance > bound);
-            // Only powers that err decide otherwise when a pixel is finished, and at few pixels.
+            // Only an error of the exponential changes the Gaussian at which a pixel ends, and it does so at few
+            // pixels.
             let (flips, most) = if error > 0.0 {
                 (image.len() / 100, bound + finished)
             } else {
@@ -183,7 +184,7 @@ fn what_allows_nothing_is_as_without() {
     for (name, scene) in all_scenes() {
         let without = draw(&gpu, &scene, None);
         assert!(draw(&gpu, &scene, Some([0.0; 2])) == without, "{name}");
-        // Below what the device has a cheaper way for.
+        // The error is less than the device's cheaper exponential has, so the exact one is used.
         assert!(draw(&gpu, &scene, Some([1e-6, 0.0])) == without, "{name}");
     }
 }

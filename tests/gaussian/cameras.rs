@@ -1,4 +1,4 @@
-//! Panoramas: what their seam does to nothing.
+//! Panoramas: the seam has no effect on the picture.
 
 use gaurast::vk::{GaussianCameraGAURAST, PipelineGaussianStateCreateInfoGAURAST};
 use gaurast_runner::{Case, simd_levels};
@@ -11,7 +11,7 @@ use gaurast_tests::scenes::{self, SceneBuffers};
 
 type State = PipelineGaussianStateCreateInfoGAURAST<'static>;
 
-/// A whole number of pixels for a quarter of a turn.
+/// The picture's size; a quarter of a turn is a whole number of pixels.
 const SIZE: [u32; 2] = [208, 104];
 
 fn draw(
@@ -38,10 +38,10 @@ fn draw(
     target.read()
 }
 
-/// A panorama from the middle of a cloud, turned to the right by some quarters of a turn.
+/// A panorama from the middle of a cloud, rotated to the right by quarter turns.
 fn panorama(quarters: usize) -> GaussianCameraGAURAST<'static> {
     let (sin, cos) = [(0.0, 1.0), (1.0, 0.0), (0.0, -1.0), (-1.0, 0.0)][quarters];
-    // Rows of camera to world: the columns are right, down and forward.
+    // The rows of the matrix from camera to world. Its columns are right, down and forward.
     let axes = [[cos, 0.0, sin], [0.0, 1.0, 0.0], [-sin, 0.0, cos]];
     let size = SIZE.map(|side| side as f32);
     GaussianCameraGAURAST::panorama(&axes, [0.2, -0.1, 5.0], size).expect("a camera")
@@ -57,14 +57,14 @@ fn difference(a: &[[f32; 4]], b: &[[f32; 4]]) -> f32 {
 fn a_panorama_that_turns_shows_the_same_further_to_the_left() {
     let gpu = Gpu::embedded(&Settings::default()).expect("a device");
     let mut scene = scenes::cloud(21, 2000, 1);
-    // Some that are wide, and one that holds the pole.
+    // Some Gaussians are wide, and one covers the pole.
     for (index, scale) in scene.scales.iter_mut().enumerate().take(60) {
         *scale = scale.map(|s| s * 3.0 + 0.01 * index as f32);
     }
     scene.positions[7] = [0.21, -2.0, 5.0];
     scene.scales[7] = [0.4; 3];
     scene.opacities[7] = 0.9;
-    // Low floors, so that decisions change little, and ellipses are large.
+    // Low floors, so that decisions change little and ellipses are large.
     let state = State::default().alpha_floor(1e-6).transmittance_floor(0.0);
     let straight = draw(&gpu, &scene, state, &panorama(0), SIZE);
     let covered = straight.iter().filter(|pixel| pixel[3] > 0.1).count();
@@ -129,7 +129,7 @@ fn a_gaussian_over_a_pole_is_no_denser_than_elsewhere(case: &Case) {
     let picture = draw(&gpu, &scene, state, &camera, SIZE);
     assert_contract("poles", &picture, &expected, Limits::ENVELOPE_ONLY);
     let [width, _] = SIZE.map(|side| side as usize);
-    // It holds the pole, hence all longitudes, once each.
+    // The Gaussian covers the pole, so it covers all longitudes, once each.
     let top = &picture[..width];
     assert!(top.iter().all(|pixel| (0.49..0.500_01).contains(&pixel[3])));
 }

@@ -1,4 +1,4 @@
-//! The conformance cases on this driver: those of the program `gaurast-conformance`, a test for each chapter.
+//! The conformance cases of the program `gaurast-conformance` on this driver, one test for each chapter.
 
 use gaurast_conformance::{Outcome, all, cases, open, run};
 use gaurast_runner::{Case, Variant};
@@ -19,7 +19,7 @@ fn every_case_passes(case: &Case) {
         }
         match run(&one, &*device) {
             Outcome::Pass(_) => passed += 1,
-            // This driver has one and four samples, and lacks nothing else.
+            // This driver supports one and four samples, and everything else.
             Outcome::NotSupported(what) => {
                 assert_eq!(what, "gaussianSampleCounts", "{}", one.path());
             }

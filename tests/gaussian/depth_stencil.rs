@@ -1,7 +1,7 @@
 //! Depth and stencil tests and multisampling of Gaussian draws, against the binary64 oracle.
 //!
-//! Triangles are drawn first; what they leave in the attachments is read back and given to the oracle, whose picture of
-//! the Gaussians is then laid over it.
+//! Triangles are drawn first. Their depths and stencils are read back and given to the oracle, and the oracle's picture
+//! of the Gaussians is blended over the colours.
 
 use ash::vk;
 use gaurast::vk::{GaussianCameraGAURAST, GaussianOrderGAURAST};
@@ -21,7 +21,7 @@ use gaurast_tests::scenes::{self, SceneBuffers};
 
 use crate::GLSLANG;
 
-/// Odd, so that tiles are cut.
+/// The picture's size; odd, so that tiles are cut.
 const SIZE: [u32; 2] = [107, 83];
 
 /// The near and the far plane of the depth buffer.
@@ -46,7 +46,7 @@ const FORMATS: [vk::Format; 5] = [
     vk::Format::D32_SFLOAT_S8_UINT,
 ];
 
-/// Depth coefficients that take the near plane to 0 and the far plane to 1, or the reverse.
+/// Depth coefficients that map the near plane to 0 and the far plane to 1, or the reverse.
 fn coefficients(reverse: bool) -> [f32; 2] {
     let [near, far] = PLANES;
     if reverse {
@@ -90,7 +90,7 @@ fn target(depth: vk::Format, samples: u32) -> TargetOptions {
     }
 }
 
-/// Triangles all over the target at depths at which there are Gaussians, one of them slanted.
+/// Triangles all over the target, at depths among those of the Gaussians; one is slanted.
 fn triangles(reverse: bool) -> Vec<Vertex> {
     let [c0, c1] = coefficients(reverse).map(f64::from);
     let depth = |z: f64| (c0 + c1 / z) as f32;
@@ -112,12 +112,12 @@ fn triangles(reverse: bool) -> Vec<Vertex> {
     all
 }
 
-/// What is drawn and tested.
+/// A draw and its tests.
 struct Case {
     name: String,
     target: TargetOptions,
     reverse: bool,
-    /// The viewport's depths of 0 and 1.
+    /// The viewport's depths for 0 and 1.
     range: [f32; 2],
     options: GaussianOptions<'static>,
 }
@@ -153,12 +153,12 @@ impl Case {
         }
     }
 
-    /// The triangles, then the Gaussians if there is a scene.
+    /// Draws the triangles, then the Gaussians if there is a scene.
     fn draw(&self, gpu: &Gpu, scene: Option<&SceneBuffers>) -> Output {
         let target = Target::new(gpu, &self.target);
         let corners = triangles(self.reverse);
         let vertices = Buffer::of(gpu, &corners);
-        // Each triangle leaves its number as its stencil.
+        // Each triangle writes its number as stencil.
         let stencil = vk::StencilOpState {
             pass_op: vk::StencilOp::REPLACE,
             compare_op: vk::CompareOp::ALWAYS,
@@ -210,7 +210,7 @@ impl Case {
         })
     }
 
-    /// Draws it and holds it against the oracle; returns how many samples have a fragment.
+    /// Draws the case and compares it with the oracle; returns the number of samples that have a fragment.
     fn judge(&self, gpu: &Gpu, scene: &SceneBuffers) -> usize {
         let before = held(&self.target, &self.draw(gpu, None));
         let after = held(&self.target, &self.draw(gpu, Some(scene)));
@@ -237,7 +237,7 @@ impl Case {
     }
 }
 
-/// Holds what a sample of each pixel stores against the oracle.
+/// Compares the stored values of one sample of each pixel with the oracle.
 fn judge_sample(name: &str, reference: &TestedReference, before: &Held, after: &Held) {
     let behind: Vec<_> = before.color.iter().map(|c| c.map(f64::from)).collect();
     let composite = reference.color.over(&behind);
@@ -321,7 +321,7 @@ fn samples_are_tested_one_by_one() {
         case.options.sample_mask = mask;
         case.judge(&gpu, &scene);
     }
-    // Without tests all samples get the same.
+    // Without tests all samples get the same values.
     let case = Case::new("4 samples untested".to_owned(), vk::Format::D32_SFLOAT, 4);
     case.judge(&gpu, &scene);
 }

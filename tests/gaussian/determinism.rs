@@ -1,5 +1,5 @@
-//! What must not change a picture, and what must change it in just one way: threads, ways of
-//! drawing the same Gaussians, parts of the target, targets' formats and backgrounds.
+//! Changes that must not affect a picture, or must affect it in a known way: the number of threads, ways of drawing the
+//! same Gaussians, parts of the target, formats of targets and backgrounds.
 
 use ash::vk;
 use gaurast::vk::GaussianCameraGAURAST;
@@ -13,7 +13,7 @@ use gaurast_tests::oracle::{OracleCamera, OracleState, render_bounded};
 use gaurast_tests::scenes::{self, SceneBuffers};
 use half::f16;
 
-/// Not whole tiles.
+/// The picture's size; not a multiple of a tile.
 const SIZE: [u32; 2] = [203, 139];
 
 fn camera() -> OracleCamera {
@@ -27,7 +27,7 @@ fn rect(x: i32, y: i32, width: u32, height: u32) -> vk::Rect2D {
     }
 }
 
-/// Gaussians `range` of a scene.
+/// The Gaussians of a scene in `range`.
 fn part(scene: &SceneBuffers, range: std::ops::Range<usize>) -> SceneBuffers {
     let triples = (scene.degree as usize + 1).pow(2);
     SceneBuffers {
@@ -51,7 +51,7 @@ fn joined(mut a: SceneBuffers, b: &SceneBuffers) -> SceneBuffers {
     a
 }
 
-/// A device, a scene on it, and what draws it into a 32-bit float target of [`SIZE`].
+/// A device, a scene on it, and a pipeline that draws it into a 32-bit float target of [`SIZE`].
 struct Bench {
     gpu: Gpu,
     pipeline: GaussianPipeline,
@@ -82,7 +82,7 @@ impl Bench {
         Target::floats(&self.gpu, SIZE)
     }
 
-    /// The texels after `record` in a pass over nothing, with the scene bound.
+    /// The texels after `record` in a pass that clears to zero, with the scene bound.
     fn draw(&self, record: impl FnOnce(&Commands)) -> Vec<[f32; 4]> {
         self.draw_to(&self.target(), &Pass::clear([0.0; 4]), record)
     }
@@ -109,7 +109,7 @@ impl Bench {
     }
 }
 
-/// A scene of trained shapes with some hard ones among them, and ties in depth.
+/// A scene of trained shapes with some difficult ones, and with equal depths.
 fn scene() -> SceneBuffers {
     joined(scenes::cloud(21, 3000, 1), &scenes::awkward(22, 100, 1))
 }
@@ -181,7 +181,7 @@ fn indices_that_name_every_gaussian_are_a_draw_without_indices() {
 
 #[gaurast_runner::test]
 fn the_order_of_indices_matters_for_ties_only() {
-    // All depths differ: sorting undoes any order of the indices.
+    // All depths differ, so sorting removes the effect of the indices' order.
     let mut scene = scenes::cloud(23, 2000, 0);
     scene.positions.sort_by(|a, b| a[2].total_cmp(&b[2]));
     scene.positions.dedup_by_key(|position| position[2]);
@@ -197,7 +197,7 @@ fn the_order_of_indices_matters_for_ties_only() {
     });
     assert_same(&bench.whole(), &indexed);
 
-    // All depths are equal: the picture is the one of the order that the indices give.
+    // All depths are equal, so the order of the indices is the order of drawing.
     let mut flat = part(&scene, 0..200);
     flat.positions.iter_mut().for_each(|p| {
         let scale = 5.0 / p[2];
@@ -251,7 +251,7 @@ fn a_part_of_the_buffers_is_a_scene_of_its_own() {
 
 #[gaurast_runner::test]
 fn instances_draw_every_gaussian_again() {
-    // Each instance is the whole scene, and ties go by instance first.
+    // Each instance is the whole scene. Ties are in the order of instances first.
     let scene = scene();
     let twice = joined(scene.clone(), &scene);
     let expected = Bench::new(&twice).whole();
@@ -262,7 +262,7 @@ fn instances_draw_every_gaussian_again() {
 
 #[gaurast_runner::test]
 fn attributes_advance_by_instance() {
-    // Two Gaussians' positions, scales and rotations, three instances' opacities and colours.
+    // Positions, scales and rotations advance by vertex, opacities and colours by instance.
     let shapes = scenes::cloud(24, 300, 0);
     let looks = scenes::cloud(25, 4, 0);
     let mut mixed = shapes.clone();
@@ -272,7 +272,7 @@ fn attributes_advance_by_instance() {
         looks_by_instance: true,
         ..GaussianOptions::new(0)
     };
-    // The first instance is 1.
+    // The first instance has index 1.
     let mut expected = SceneBuffers::default();
     for instance in 1..4 {
         let mut copy = shapes.clone();
@@ -348,7 +348,7 @@ fn the_viewport_says_where_the_camera_s_picture_is() {
         let name = format!("viewport at {x}, {y}");
         assert_contract(&name, &within, &reference, Limits::ENVELOPE_ONLY);
 
-        // A flipped viewport covers the same pixels, and cameras don't flip.
+        // A viewport with negative height covers the same pixels, and the camera's picture is not flipped.
         let flipped = draw([
             corner[0],
             corner[1] + whole_size[1],
@@ -406,7 +406,7 @@ fn the_render_area_cuts_and_changes_nothing_else() {
     }
 }
 
-/// `image` within `rect`, `outside` around it.
+/// `image` inside `rect`, and `outside` everywhere else.
 fn inside(image: &[[f32; 4]], rect: vk::Rect2D, outside: [f32; 4]) -> Vec<[f32; 4]> {
     let within = |at: usize, offset: i32, length: u32| {
         let at = at as i64 - i64::from(offset);
@@ -438,7 +438,7 @@ fn blending_composites_over_the_background() {
             .iter()
             .map(|rgba| composite(rgba.map(f64::from), background.map(f64::from)))
             .collect();
-        // One product and one sum of numbers up to 3.
+        // The error of one product and one sum of numbers up to 3.
         assert_close(&blended, &expected, 4e-7);
     }
 }
@@ -450,7 +450,7 @@ fn composite(front: [f64; 4], behind: [f64; 4]) -> [f64; 4] {
 
 #[gaurast_runner::test]
 fn draws_of_a_pass_are_composited_in_their_order() {
-    // Each draw is sorted within itself: a later one is over an earlier one at any depth.
+    // Each draw is sorted by itself: a later one is over an earlier one at any depth.
     let scene = scenes::cloud(26, 3000, 1);
     let options = GaussianOptions {
         blend: vec![over()],
@@ -459,7 +459,7 @@ fn draws_of_a_pass_are_composited_in_their_order() {
     let bench = Bench::with(&scene, &Settings::default(), &options);
     let background = [0.1, 0.2, 0.3, 0.4];
     let parts = [0..1000_usize, 1000..1003, 1003..2500, 2500..3000];
-    // Every outcome of every pixel: a few are undecidable in one of the draws.
+    // All outcomes of every pixel, because a few pixels are undecidable in one of the draws.
     let nothing = vec![vec![background.map(f64::from)]; (SIZE[0] * SIZE[1]) as usize];
     let expected = parts.iter().fold(nothing, |behind, range| {
         let part = part(&scene, range.clone());
@@ -484,7 +484,7 @@ fn draws_of_a_pass_are_composited_in_their_order() {
         assert!(nearest <= 5e-6, "{rgba:?} is {nearest:e} from {outcomes:?}");
     }
 
-    // The same as several draws of one indirect command.
+    // The same draws by one indirect command.
     let numbers: Vec<[u32; 4]> = parts
         .iter()
         .map(|range| [range.len() as u32, 1, range.start as u32, 0])
@@ -495,7 +495,7 @@ fn draws_of_a_pass_are_composited_in_their_order() {
     });
     assert_same(&drawn, &indirect);
 
-    // And as passes of their own, each loading what the one before left.
+    // The same draws in separate passes, each of which loads the result of the one before.
     let target = bench.target();
     bench.draw_to::<[f32; 4]>(&target, &Pass::clear(background), |_| ());
     let mut passes = Vec::new();
@@ -568,7 +568,7 @@ fn formats_differ_by_their_quantisation_alone() {
 
     let (_bench, target) = draw(vk::Format::R8G8B8A8_UNORM);
     let rgba: Vec<[u8; 4]> = target.read();
-    // Half a step is where rounding may go either way.
+    // At half a step, rounding may go either way.
     for (expected, texel) in bytes.clone().zip(&rgba) {
         let steps = expected.iter().zip(texel).map(|(a, b)| a.abs_diff(*b));
         assert!(steps.max() <= Some(1), "{texel:?} for {expected:?}");

@@ -1,4 +1,4 @@
-//! The oracle on scenes that were trained, and beside another renderer.
+//! The oracle on trained scenes, compared with another renderer.
 
 use gaurast_runner::{Case, Need, Variant, data};
 use gaurast_scene::camera::DEFAULT_FOV;
@@ -38,8 +38,8 @@ fn trained_scenes_are_drawn_and_nearly_all_decidable(case: &Case) {
     assert_eq!(reference.exhausted, 0);
 }
 
-/// Pictures by splat-transform with its own cut-offs, 8 bits a channel and lossy: another independent renderer is as far
-/// from them as is asked here.
+/// Checks the PSNR of the oracle's picture. The given pictures come from splat-transform, which has its own cut-offs
+/// and writes lossy 8-bit images. Another independent renderer differs from them by about as much.
 fn assert_psnr(given: &Given, least: f64) {
     let scene = gaurast_scene::open(data(given.scene)).unwrap();
     let drawn = render_bounded(

@@ -1,5 +1,5 @@
-//! A head of triangles among Gaussians, and a pane that cuts through both: in front of, behind and inside the
-//! Gaussians, held against the oracle's composite.
+//! A head of triangles among Gaussians, and a rectangle that cuts through both: in front of, behind and inside the
+//! Gaussians, compared with the oracle's composite.
 
 use std::path::Path;
 
@@ -24,20 +24,20 @@ use crate::GLSLANG;
 
 const SIZE: [u32; 2] = [320, 240];
 
-/// Gaussians, triangles in their world, and how they are seen.
+/// Gaussians, triangles in their world space, and a camera.
 pub(super) struct Hybrid {
     pub(super) name: &'static str,
     scene: SceneBuffers,
     camera: GaussianCameraGAURAST<'static>,
-    /// In clip coordinates; drawn before the Gaussians.
+    /// The head in clip coordinates, which is drawn before the Gaussians.
     head: Vec<Vertex>,
-    /// Drawn after them.
+    /// The rectangle in clip coordinates, which is drawn after the Gaussians.
     pane: Vec<Vertex>,
     target: TargetOptions,
     compare: vk::CompareOp,
 }
 
-/// What is drawn.
+/// The parts that are drawn.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum What {
     Head,
@@ -45,7 +45,7 @@ pub(super) enum What {
     Everything,
 }
 
-/// The head's triangles, with their texture's colours under a light; `place` takes its points to the world.
+/// The head's triangles, with the colours of its texture under a light. `place` maps its points to world space.
 fn head(model: &Model, place: impl Fn(DVec3) -> DVec3, to_clip: &ToClip) -> Vec<Vertex> {
     let light = Vec3::new(0.4, 0.5, 0.8).normalize();
     let mut vertices = Vec::new();
@@ -128,7 +128,7 @@ impl Hybrid {
         })
     }
 
-    /// Draws everything and holds each sample against the oracle's composite.
+    /// Draws everything and compares each sample with the oracle's composite.
     fn judge(&self) {
         let gpu = Gpu::embedded(&Settings::default()).expect("a device");
         let held_of = |output: &Output| held(&self.target, output);
@@ -162,7 +162,7 @@ impl Hybrid {
         let drawn = render_tested(&scene, &camera, &state, &tests, &head.stored);
         let behind: Vec<_> = head.color.iter().map(|c| c.map(f64::from)).collect();
         let mut composite = drawn.color.over(&behind);
-        // The pane, where it passes against what the Gaussians may have stored.
+        // The rectangle, where it passes the depth test against the depths that the Gaussians may have stored.
         let (mut shown, mut hidden) = (0, 0);
         for (at, color) in pane.color.iter().enumerate().filter(|(_, c)| c[3] == 1.0) {
             let depth = pane.stored.depth[at];
@@ -188,7 +188,7 @@ impl Hybrid {
             shown > 500 && hidden > 500,
             "the pane goes through the scene: {shown} samples of it are shown, {hidden} hidden"
         );
-        // The head is before some Gaussians and behind others.
+        // The head is in front of some Gaussians and behind others.
         let is_head = |at: &usize| head.color[*at][3] == 1.0;
         let changed = |at: &usize| drawn.color.nominal[*at][3] > 0.0;
         let pixels = 0..head.color.len();
@@ -203,7 +203,7 @@ impl Hybrid {
     }
 }
 
-/// The garden's frame from one with y up.
+/// Converts a point from axes with y up to those of the garden.
 fn turn(point: DVec3) -> DVec3 {
     DVec3::new(point.x, -point.y, -point.z)
 }
@@ -219,7 +219,7 @@ pub(super) fn garden(name: &'static str, depth: vk::Format, samples: u32) -> Hyb
         .to_vulkan()
         .depth_coefficients([far / (far - near), -near * far / (far - near)]);
     let to_clip = ToClip { camera, size: SIZE };
-    // It stands in the meadow and looks to the camera.
+    // The head is in the meadow and faces the camera.
     let place = |point: DVec3| {
         let (sin, cos) = 0.35f64.sin_cos();
         let p = 0.75 * point;
@@ -280,7 +280,7 @@ pub(super) fn playbot() -> Hybrid {
         .to_vulkan()
         .depth_coefficients([-near / (far - near), near * far / (far - near)]);
     let to_clip = ToClip { camera, size: SIZE };
-    // Around the point that the camera looks at, in its own axes: right, down and forward.
+    // The head is at the point that the camera looks at, in the camera's axes: right, down and forward.
     let rotation = DMat3::from_cols_array(&camera.rotation.map(f64::from));
     let (middle, radius) = middle(&scene, &camera);
     let from_view = |view: DVec3| middle + rotation * (radius * view);
@@ -307,7 +307,7 @@ fn a_head_is_inside_a_trained_scene_with_reversed_depth() {
     playbot().judge();
 }
 
-/// The middle of the Gaussians along the camera's axis, and the distance within which half of them are.
+/// The centre of the Gaussians along the camera's axis, and the distance within which half of them are.
 fn middle(scene: &Scene, camera: &GaussianCameraGAURAST) -> (DVec3, f64) {
     let points: Vec<DVec3> = (scene.positions().iter())
         .map(|&position| Vec3::from(position).as_dvec3())

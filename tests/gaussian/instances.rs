@@ -1,4 +1,4 @@
-//! Gaussians that are drawn more than once, each time where a matrix places them; and scenes far from the origin.
+//! Gaussians that are drawn several times with different model matrices, and scenes far from the origin.
 
 use ash::vk;
 use gaurast::vk::{
@@ -31,12 +31,12 @@ const IDENTITY: [[f32; 4]; 3] = [
     [0.0, 0.0, 1.0, 0.0],
 ];
 
-/// How a scene is drawn.
+/// The way in which a scene is drawn.
 #[derive(Clone, Copy)]
 struct Way<'a> {
     state: State,
     camera: Camera,
-    /// What places the Gaussians, by instance or by vertex.
+    /// The placements of the Gaussians, by instance or by vertex.
     instances: Option<(&'a [OracleInstance], vk::VertexInputRate)>,
     half: bool,
 }
@@ -93,7 +93,7 @@ fn draw(gpu: &Gpu, scene: &SceneBuffers, way: &Way<'_>) -> Vec<[f32; 4]> {
     target.read()
 }
 
-/// What a scene means that is drawn once for each of `instances`.
+/// The oracle's picture of a scene that is drawn once for each of `instances`.
 fn reference(
     scene: &SceneBuffers,
     instances: &[OracleInstance],
@@ -129,7 +129,8 @@ fn device(case: &Case) -> Gpu {
     .expect("a device")
 }
 
-/// Matrices that turn, stretch, shear, mirror and move, one that is singular and one that is none, and factors.
+/// Matrices that rotate, stretch, shear, mirror and translate, a singular one, one that is not finite, and opacity
+/// factors.
 fn any_instances(seed: u64) -> Vec<OracleInstance> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut instances: Vec<OracleInstance> = (0..7)
@@ -203,7 +204,7 @@ fn instances_keep_the_contract_through_every_camera(case: &Case) {
     }
 }
 
-/// A Gaussian with numbers of few bits, so that what is done to them below is exact.
+/// The scene with numbers of few bits, so that the operations below are exact.
 fn exact(scene: &SceneBuffers) -> SceneBuffers {
     let round = |value: f32| (value * 1024.0).round() / 1024.0;
     SceneBuffers {
@@ -213,14 +214,14 @@ fn exact(scene: &SceneBuffers) -> SceneBuffers {
     }
 }
 
-/// Half a turn about y, twice the size, and moved.
+/// Half a turn about y, with twice the size, and a translation.
 const SIMILARITY: [[f32; 4]; 3] = [
     [-2.0, 0.0, 0.0, 0.25],
     [0.0, 2.0, 0.0, -0.5],
     [0.0, 0.0, -2.0, 16.0],
 ];
 
-/// What that makes of a scene of degree 1.
+/// The transformed Gaussians of a scene of degree 1.
 fn transformed(scene: &SceneBuffers) -> SceneBuffers {
     let gaussians = (0..scene.positions.len()).map(|i| {
         let [w, x, y, z] = scene.rotations[i];
@@ -231,7 +232,7 @@ fn transformed(scene: &SceneBuffers) -> SceneBuffers {
             scale: scene.scales[i].map(|s| 2.0 * s),
             rotation: [-y, z, w, -x],
             opacity: scene.opacities[i],
-            // The functions of the first degree are -y, z and -x.
+            // The basis functions of the first degree are -y, z and -x.
             sh: vec![sh[0], sh[1], sh[2].map(|c| -c), sh[3].map(|c| -c)],
         }
     });
@@ -260,7 +261,7 @@ fn an_instance_is_a_scene_that_was_transformed_before(case: &Case) {
     });
     static REFERENCES: ForLevels<Reference> = ForLevels::new();
     let gpu = device(case);
-    // Together in one sorted set, as one draw or as one instance each.
+    // Both in one sorted set: as one draw, or as one instance each.
     for state in [
         State::default(),
         State::default().linearization(GaussianLinearizationGAURAST::UNSCENTED),
@@ -316,7 +317,7 @@ fn half_floats_are_the_floats_that_they_are(case: &Case) {
     let half = draw(&gpu, &scene, &Way { half: true, ..way });
     let float = draw(&gpu, &rounded, &way);
     assert!(half == float);
-    // Eleven bits of a position are a thousandth of it; the picture moves by a fraction of a pixel.
+    // A position of eleven bits has a relative error of a thousandth, which moves the picture by a fraction of a pixel.
     let exact = draw(&gpu, &scene, &way);
     let pairs = exact.as_flattened().iter().zip(half.as_flattened());
     let squares: f64 = pairs.map(|(a, b)| f64::from(a - b).powi(2)).sum();
@@ -328,7 +329,7 @@ fn half_floats_are_the_floats_that_they_are(case: &Case) {
 fn a_scene_that_moves_far_away_with_its_camera_looks_the_same(case: &Case) {
     const FAR: f32 = 1_048_576.0;
     let mut scene = scenes::cloud(35, 1500, 1);
-    // What binary32 holds so far out, too.
+    // The positions are exact in binary32 at this distance.
     let round = |value: f32| (value * 8.0).round() / 8.0;
     for position in &mut scene.positions {
         *position = position.map(round);

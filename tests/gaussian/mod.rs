@@ -1,4 +1,4 @@
-//! Gaussian draws, from an application's calls to pixels.
+//! Tests of Gaussian draws, from an application's calls to pixels.
 
 mod accuracy;
 mod approximations;
@@ -20,6 +20,6 @@ mod shaded;
 mod viewer;
 mod what_ifs;
 
-/// Trained scenes of the real data.
+/// A trained scene of the test data.
 const SKULL: &str = "splats/skull.ply";
 const PLAYBOT: &str = "splats/playbot-125k.ply";

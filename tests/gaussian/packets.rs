@@ -1,4 +1,4 @@
-//! What packets are about: buffers, images and the attributes of Gaussians, in memory of the device.
+//! Resources of packets: buffers, images and the attributes of Gaussians, in device memory.
 
 use gaurast_tests::scenes::SceneBuffers;
 use simdevice::format::Aspect;

@@ -1,8 +1,8 @@
-//! Popping: how much a picture changes because the order does, while the camera turns.
+//! Popping: the change of a picture that is caused only by a new order, while the camera rotates.
 //!
-//! A camera that only turns moves every point by the same law whatever its depth, so that Gaussians
-//! should never overtake each other. What a step's new order changes is measured without any
-//! warping of pictures: the next view is drawn in its own order and in that of the view before.
+//! A rotating camera moves every point in the same way at all depths, so Gaussians should never change their order. The
+//! change by a step's new order is measured without warping pictures: the next view is drawn in its own order and in
+//! the order of the view before.
 
 use ash::vk;
 use gaurast::vk::{
@@ -26,7 +26,7 @@ type Picture = Vec<[f32; 4]>;
 
 const SIZE: [u32; 2] = [400, 300];
 const STEPS: usize = 10;
-/// A tenth of a degree.
+/// The rotation of a step: a tenth of a degree.
 const STEP: f64 = std::f64::consts::PI / 1800.0;
 
 /// The camera after a number of steps about its own vertical axis.
@@ -43,7 +43,7 @@ fn turned(camera: &GaussianCameraGAURAST<'static>, steps: usize) -> GaussianCame
     camera.rotation(rotation)
 }
 
-/// What the device sorts by, as the specification says it: in binary64, rounded.
+/// The device's sort keys as the specification defines them: in binary64, then rounded.
 fn keys(
     scene: &SceneBuffers,
     camera: &GaussianCameraGAURAST,
@@ -112,7 +112,7 @@ impl Bench {
         target.read()
     }
 
-    /// The greatest change of a channel of any step's picture by its new order.
+    /// The greatest change of a channel by the new order, over all steps.
     fn popping(&self, camera: &GaussianCameraGAURAST<'static>, order: GaussianOrderGAURAST) -> f32 {
         let sorted = Self::pipeline(&self.gpu, &self.scene, order);
         let names = |camera: &GaussianCameraGAURAST| {
@@ -143,8 +143,8 @@ impl Bench {
     }
 }
 
-/// Depth along the axis changes as the camera turns, by which pixels change as much as `by_depth` says; distance from the
-/// eye does not.
+/// Checks that sorting by depth along the axis changes pixels as much as `by_depth` says, because that depth changes as
+/// the camera rotates, and that sorting by distance from the eye changes nothing.
 fn compare(
     scene: SceneBuffers,
     camera: GaussianCameraGAURAST<'static>,
@@ -165,14 +165,14 @@ fn compare(
 fn turning_pops_by_view_depth_and_not_by_distance() {
     let camera = scenes::camera(SIZE[0], SIZE[1]).to_vulkan();
     let mut cloud = scenes::cloud(70, 4000, 1);
-    // Large enough to overlap, so that their order shows.
+    // The Gaussians are large enough to overlap, so that their order is visible.
     for scale in cloud.scales.as_flattened_mut() {
         *scale *= 6.0;
     }
     compare(cloud, camera, 0.01..1.0);
 }
 
-/// Which pixels of a picture are looked at one by one, in x and y, and after how many steps.
+/// The distance of sampled pixels in x and y, and the number of steps between samples.
 #[derive(Clone, Copy)]
 struct Sampling {
     stride: usize,
@@ -184,8 +184,8 @@ const EVERY_FIFTH: Sampling = Sampling {
     steps: 3,
 };
 
-/// The greatest change of any sampled pixel by a step's new order, where each pixel has an order of its own: that of the
-/// same ray in the view before. `by_axis` takes depth along the camera's axis instead, at each pixel.
+/// The greatest change of a sampled pixel by a step's new order, if each pixel has its own order: that of the same ray
+/// in the view before. With `by_axis`, each pixel is sorted by the depth along the camera's axis instead.
 fn popping_of_rays(
     scene: &SceneBuffers,
     camera: &GaussianCameraGAURAST<'static>,
@@ -208,8 +208,8 @@ fn popping_of_rays(
                 .map(|index| project(&input, &view, &state, index).ok())
                 .collect()
         });
-        // A point of the new picture, in the old one.
-        // Row by row read as columns: camera to world.
+        // A point of the new picture, mapped to the old one. The rows, read as columns, are the matrix from camera to
+        // world.
         let world = views.map(|view| DMat3::from_cols_array(&view.rotation.map(f64::from)));
         let to_old = world[0].inverse() * world[1];
         let [fx, fy] = views[1].focal.map(f64::from);
@@ -264,9 +264,9 @@ fn popping_of_rays(
 fn rays_pop_not(scene: &SceneBuffers, camera: &GaussianCameraGAURAST<'static>, sampling: Sampling) {
     let of = |by_axis| popping_of_rays(scene, camera, sampling, by_axis);
     let [by_axis, by_ray] = [true, false].map(of);
-    // Far more than rounding.
+    // The change by the axis order is far more than rounding.
     assert!(by_axis > 1e-4, "nothing pops");
-    // The sums themselves are rounded.
+    // Only the sums are rounded.
     assert!(by_ray < 1e-12, "{by_ray}");
 }
 
@@ -279,7 +279,7 @@ fn turning_pops_nowhere_where_each_pixel_sorts_for_itself() {
     }
     rays_pop_not(&cloud, &camera, EVERY_FIFTH);
 
-    // These are the orders that the device draws in.
+    // The device draws in the same orders.
     let bench = Bench::new(cloud);
     let order = GaussianOrderGAURAST::PER_PIXEL;
     let pipeline = Bench::pipeline(&bench.gpu, &bench.scene, order);
@@ -298,12 +298,12 @@ fn skull_pops_by_view_depth_alone() {
     let scene = gaurast_scene::open(data(SKULL)).expect("a scene");
     let camera = gaurast_scene::frame(&scene, DEFAULT_FOV, SIZE).to_vulkan();
     let scene = SceneBuffers::from(&scene);
-    // Tens of thousands of Gaussians at every pixel that is looked at.
+    // Tens of thousands of Gaussians cover every sampled pixel.
     let sampling = Sampling {
         stride: 25,
         steps: 2,
     };
     rays_pop_not(&scene, &camera, sampling);
-    // By up to 0.072, as `docs/gaussian-draws.md` says.
+    // The change is up to 0.072, as `docs/gaussian-draws.md` says.
     compare(scene, camera, 0.071..0.073);
 }

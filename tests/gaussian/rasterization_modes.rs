@@ -1,5 +1,5 @@
-//! The per-pixel order and 2D Gaussians against the binary64 oracle, at every SIMD level, with one worker thread and with
-//! two.
+//! The per-pixel order and 2D Gaussians against the binary64 oracle, at every SIMD level, with one worker thread and
+//! with two.
 
 use gaurast::vk::{
     GaussianCameraGAURAST, GaussianCameraModelGAURAST, GaussianGeometryGAURAST,
@@ -19,7 +19,7 @@ fn flat() -> State {
         .low_pass_variance(0.5)
 }
 
-/// States of each mode, whose names tell them apart.
+/// The named states of each mode.
 fn states() -> Vec<(&'static str, State)> {
     let lax = |state: State| state.alpha_floor(1e-4).transmittance_floor(0.0);
     let per_pixel = State::default().order(GaussianOrderGAURAST::PER_PIXEL);
@@ -83,7 +83,7 @@ fn awkward_scenes_stay_within_the_envelope(case: &Case) {
 
 #[gaurast_runner::test(each = simd_levels())]
 fn ten_thousand_layers_on_a_pixel_are_sorted(case: &Case) {
-    // Faint ones, in no order, so that none ends a pixel.
+    // Faint Gaussians in no particular order, so that no pixel is finished early.
     let mut scene = scenes::cloud(32, 10_000, 0);
     for (index, position) in scene.positions.iter_mut().enumerate() {
         let z = 2.0 + (index * 7919 % 10_000) as f32 * 1e-3;

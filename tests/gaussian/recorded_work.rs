@@ -1,5 +1,5 @@
-//! Both models of the rasterizer's timing over what devices recorded: hybrids of triangles and Gaussians, and random
-//! interleavings.
+//! Both models of the rasterizer's timing on the recorded work of devices: scenes with triangles and Gaussians, and
+//! random interleavings.
 
 use ash::vk;
 use gaurast_runner::{Case, Need, Variant};
@@ -10,7 +10,7 @@ use gaurast_tests::recorded::{Agreement, read};
 use super::hybrid_scenes::{GARDEN, WITH_PLAYBOT, What, garden, playbot};
 use super::interleavings;
 
-/// A variant for each hybrid, by name.
+/// A variant for each of these scenes, by name.
 fn hybrids() -> Vec<Variant> {
     let variant = |name, needs: &[Need]| Variant {
         needs: needs.to_vec(),

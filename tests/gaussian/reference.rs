@@ -1,4 +1,4 @@
-//! The renderer's pictures against pictures that another renderer made.
+//! Pictures of the renderer, compared with those of another renderer.
 
 use std::path::Path;
 
@@ -8,18 +8,18 @@ use gaurast_scene::camera::Camera;
 use gaurast_testkit::{Settings, with_settings};
 use gaurast_tests::compare::Statistics;
 
-/// A scene, and a picture that another renderer made of it.
+/// A scene, and another renderer's picture of it.
 pub(super) struct Given {
     /// The scene's file.
     pub scene: &'static str,
     /// The picture's file.
     picture: &'static str,
     eye: [f64; 3],
-    /// The picture's pixels.
+    /// The picture's size in pixels.
     pub size: [u32; 2],
 }
 
-/// 400 round Gaussians.
+/// A scene of 400 round Gaussians.
 pub(super) const TINY: Given = Given {
     scene: "reference/tiny.generated.ply",
     picture: "reference/tiny.webp",
@@ -27,7 +27,7 @@ pub(super) const TINY: Given = Given {
     size: [320, 240],
 };
 
-/// 48,400 of them.
+/// A scene of 48,400 round Gaussians.
 pub(super) const MID: Given = Given {
     scene: "reference/mid.generated.ply",
     picture: "reference/mid.webp",
@@ -36,18 +36,18 @@ pub(super) const MID: Given = Given {
 };
 
 impl Given {
-    /// The files.
+    /// The two files.
     pub fn needs(&self) -> [Need; 2] {
         [Need::Data(self.scene), Need::Data(self.picture)]
     }
 
-    /// The camera. The other renderer's world has y upwards.
+    /// The camera. In the other renderer's world y points up.
     pub fn camera(&self) -> Camera {
         let up = [0.0, 1.0, 0.0];
         Camera::look_at(self.eye, [0.0; 3], up, 60.0, self.size).expect("a camera")
     }
 
-    /// The picture.
+    /// The pixels of the given picture.
     pub fn pixels(&self) -> Vec<[f32; 4]> {
         pixels(&data(self.picture))
     }
@@ -59,7 +59,7 @@ fn pixels(path: &Path) -> Vec<[f32; 4]> {
     picture.pixels().map(|rgb| pixel(rgb.0)).collect()
 }
 
-/// PSNR of the PNG that the `gaurast` command would write.
+/// Checks the PSNR of the PNG that the `gaurast` command would write.
 fn assert_psnr(given: &Given, least: f64) {
     let scene = gaurast_scene::open(data(given.scene)).expect("a scene");
     let renderer = with_settings(&Settings::default(), || {
@@ -76,7 +76,7 @@ fn assert_psnr(given: &Given, least: f64) {
     assert!(statistics.psnr >= least, "{statistics}");
 }
 
-/// The two renderers cut Gaussians off elsewhere.
+/// The two renderers cut Gaussians off at different distances.
 #[gaurast_runner::test(needs = TINY.needs())]
 fn tiny_is_as_another_renderer_drew_it() {
     assert_psnr(&TINY, 45.0);

@@ -1,4 +1,5 @@
-//! The second implementation, which was written from the extension's text alone, against the oracle and beside the device.
+//! The second implementation, which was written from the extension's text alone, compared with the oracle and with the
+//! device.
 
 use gaurast_conformance::{Draw, Implementation, Outcome, Second, all, cases, run};
 use gaurast_runner::{Case, Need, Variant, data};
@@ -10,14 +11,14 @@ use gaurast_tests::scenes::{self, SceneBuffers};
 use super::accuracy::{PLANT, SIZE, State, View, draw, generated_view, states, views};
 use super::{PLAYBOT, SKULL};
 
-/// How far the second implementation may be from the envelope: it is of binary64, so that little but the rounding of its
-/// picture to binary32 remains.
+/// The limits of the second implementation. It computes in binary64, so little more than the rounding of its picture to
+/// binary32 is allowed.
 const LIMITS: Limits = Limits {
     distance: 2e-7,
     ..Limits::ENVELOPE_ONLY
 };
 
-/// Holds the pictures of both implementations against the oracle's.
+/// Compares the pictures of both implementations with the oracle's.
 fn judge(gpu: &Gpu, name: &str, scene: &SceneBuffers, state: State, views: &[View]) {
     let pictures = draw(gpu, scene, state, views);
     for (view, drawn) in views.iter().zip(pictures) {
@@ -47,8 +48,8 @@ fn gpu() -> Gpu {
     Gpu::embedded(&Settings::default()).expect("a device")
 }
 
-/// Views of generated scenes: from in front, from the middle, where Gaussians lie at the near plane and all around, turned
-/// and off centre, and mirrored.
+/// Views of generated scenes: from the front; from the middle, with Gaussians at the near plane and all around; rotated
+/// and off centre; and mirrored.
 fn generated_views() -> Vec<View> {
     let front = generated_view(Limits::ENVELOPE_ONLY).camera;
     let view = |name: &str, camera| View {
@@ -117,7 +118,7 @@ fn both_draw_the_synthetic_scene() {
 
 #[gaurast_runner::test]
 fn both_draw_far_from_the_origin() {
-    // Positions are binary32: a unit in the last place is 1/16 there.
+    // Positions are binary32, whose unit in the last place is 1/16 at this distance.
     let away = 1e6_f32;
     let mut scene = scenes::cloud(46, 1500, 1);
     for position in &mut scene.positions {
@@ -132,7 +133,7 @@ fn both_draw_far_from_the_origin() {
     judge(&gpu(), "far", &scene, State::default(), &views);
 }
 
-/// The trained scene of a file, from three sides.
+/// Compares both implementations on the trained scene of a file, from three sides.
 fn both_draw(name: &'static str) {
     let scene = gaurast_scene::open(data(name)).expect("a scene");
     let mut views = views(&scene);

@@ -1,4 +1,4 @@
-//! The document of what skips would bring as hardware is of what the device does.
+//! The document about skips as hardware is up to date with the device.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! Real kernels give what the host computes, on this driver and on lavapipe.
+//! Realistic kernels give the results that the host computes, on this driver and on lavapipe.
 
 use gaurast_runner::Need;
 use gaurast_tests::kernels::{Context, Size, all};

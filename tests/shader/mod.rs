@@ -1,4 +1,4 @@
-//! Shader cores as a Vulkan application sees them.
+//! Tests of the shader cores through Vulkan.
 
 mod instructions;
 mod kernels;
@@ -6,7 +6,7 @@ mod structured;
 
 use gaurast_tests::kernels::Context;
 
-/// lavapipe, where `Need::Lavapipe` is met.
+/// The context of lavapipe, if `Need::Lavapipe` is met.
 fn lavapipe() -> Context {
     let found = Context::lavapipe().expect("lavapipe is opened");
     found.expect("the loader knows lavapipe")

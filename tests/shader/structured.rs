@@ -1,4 +1,4 @@
-//! Programs of random control flow give what a scalar interpreter says, on this driver and on lavapipe.
+//! Programs of random control flow give the results of a scalar interpreter, on this driver and on lavapipe.
 
 use gaurast_runner::Need;
 use gaurast_tests::kernels::{Context, Kernel};
@@ -11,14 +11,15 @@ use std::process::Command;
 
 use super::lavapipe;
 
-/// Programs of a shader.
+/// The number of programs of a shader.
 const PROGRAMS: u64 = 20;
-/// Seeds on this driver.
+/// The number of seeds on this driver.
 const SEEDS: u64 = 4000;
-/// Seeds on lavapipe, whose compiler takes its time.
+/// The number of seeds on lavapipe, whose compiler is slow.
 const SAMPLE: u64 = 100;
 
-/// Invocations' inputs: small numbers, so that conditions hold and fail, and any.
+/// The inputs of invocations: small numbers, so that conditions are sometimes true and sometimes false, and random
+/// ones.
 fn inputs() -> Vec<[u32; 2]> {
     let mut random = ChaCha8Rng::seed_from_u64(71);
     (0..INVOCATIONS)
@@ -46,7 +47,7 @@ fn kernel(spirv: &[u32], inputs: &[[u32; 2]], programs: usize) -> Kernel {
     }
 }
 
-/// Runs the programs of seeds and compares; returns the seeds that are wrong and how.
+/// Runs the programs of seeds; returns the seeds with wrong results and the differences.
 fn differences(
     context: &Context,
     seeds: std::ops::Range<u64>,
@@ -80,9 +81,9 @@ fn differences(
     wrong
 }
 
-/// Runs as many seeds; those that are wrong must be those that the list names, each with a reason. Without a list none
-/// may be. The list of another driver was made with one version of it on one processor: a few more may be, and no more
-/// than that.
+/// Runs the programs of `seeds` seeds. Seeds with wrong results must be in the list, which gives a reason for each;
+/// with an empty list there may be none. The list of another driver was made with one version of it on one processor,
+/// so a few more may be wrong, but no more than the list has.
 fn check(context: &Context, seeds: u64, list: &str, rewrite: impl Fn(Vec<u32>) -> Vec<u32> + Copy) {
     let listed: Vec<u64> = list
         .lines()
@@ -110,7 +111,7 @@ fn check(context: &Context, seeds: u64, list: &str, rewrite: impl Fn(Vec<u32>) -
     );
 }
 
-/// Runs a program of the system on a module; returns what it prints.
+/// Runs an installed program on a module; returns its output.
 fn system(program: &str, arguments: &[&str], words: &[u32]) -> Vec<u8> {
     let file = tempfile::NamedTempFile::new().unwrap();
     std::fs::write(file.path(), bytemuck::cast_slice(words)).unwrap();

@@ -1,4 +1,4 @@
-//! The model of the rasterizer held against its hardware.
+//! Tests of the rasterizer's timing model against its hardware description.
 
 mod rtl;
 mod tiles;

@@ -1,4 +1,5 @@
-//! The module in SystemVerilog, under Verilator, against the model bit by bit, and its cycles against the stepped model's.
+//! Compares the SystemVerilog module, run by Verilator, with the model: its pixels bit by bit, and its cycles with the
+//! stepped model's.
 
 use super::tiles::{self, View};
 use gaurast_runner::{Case, Need, Variant, data, is_long};
@@ -24,12 +25,12 @@ fn format(case: &Case) -> Format {
     found.expect("a format").1
 }
 
-/// A folder that keeps what Verilator builds from one run of the tests to the next.
+/// A folder that keeps Verilator's build between test runs.
 fn folder() -> PathBuf {
     Path::new(env!("CARGO_TARGET_TMPDIR")).join("rtl")
 }
 
-/// One build at a time: tests of a process share what is built.
+/// A lock for one build at a time, because tests of a process share the build.
 static BUILDING: Mutex<()> = Mutex::new(());
 
 fn module_bench(format: Format) -> ModuleBench {
@@ -51,7 +52,7 @@ fn units_compute_the_models_bits(case: &Case) {
         .map(|index| {
             let mut number = || match index % 3 {
                 0 => random.random::<u32>() & mask,
-                // Of magnitudes near 1.
+                // Numbers with magnitudes near 1.
                 _ => {
                     let exponent = (format.bias() + random.random_range(-8..8)) as u32;
                     let rest = random.random::<u32>()
@@ -80,7 +81,7 @@ fn units_compute_the_models_bits(case: &Case) {
     }
 }
 
-/// Draws lists on both, and holds every pixel against its twin.
+/// Draws lists on both, and compares every pixel.
 fn compare(bench: &ModuleBench, module: &Module, lists: &[List]) -> Vec<Drawn> {
     let rasterized = bench.run(lists, module, LATENCY).expect("a run");
     assert_eq!(rasterized.pixels.len(), lists.len());
@@ -153,10 +154,10 @@ fn the_modules_cycles_are_the_stepped_models(case: &Case) {
             );
         };
         near(all, if setting.masked { 0.12 } else { 0.08 });
-        // Pixels that are on their way finish later than the model has it.
+        // In the module, pixels in the pipeline finish later than in the model.
         assert!(busy[0] >= busy[1]);
         near(busy, 0.04);
-        // The model doesn't know who shares what.
+        // With masks, the model does not know which Gaussians share groups of pixels.
         near(dependency, if setting.masked { 0.12 } else { 0.0 });
         near(memory, 0.12);
         near(controller, 0.01);

@@ -1,4 +1,4 @@
-//! Lists of tiles for the rasterizer module: those of scenes, and generated ones that press it.
+//! Lists of tiles for the rasterizer module: those of scenes, and generated ones that are difficult.
 
 use gaurast_oracle::oracle::project::project;
 use gaurast_oracle::oracle::splat::Splat;
@@ -15,14 +15,14 @@ use timing_studies::pe::{Gaussian, Triangle};
 
 const SIDE: f64 = 16.0;
 
-/// Gaussians of a scene as its pixels see them, in depth order.
+/// Projected Gaussians of a scene in depth order.
 pub struct View {
     splats: Vec<Splat>,
     size: [u32; 2],
 }
 
 impl View {
-    /// The scene of a file, framed as `gaurast render` frames it.
+    /// Opens the scene of a file, seen from the same camera as in `gaurast render`.
     pub fn open(path: &Path, size: [u32; 2]) -> Self {
         let scene = gaurast_scene::open(path).expect("a scene");
         let camera = gaurast_scene::frame(&scene, 60f64.to_radians(), size);
@@ -35,7 +35,7 @@ impl View {
         Self { splats, size }
     }
 
-    /// The lists of `count` tiles with something in them, drawn by a seed.
+    /// The lists of `count` random tiles that are not empty, selected by a seed.
     pub fn lists(
         &self,
         format: Format,
@@ -71,7 +71,7 @@ impl View {
     }
 }
 
-/// Distance along an axis within which alpha reaches its floor.
+/// The distance along an axis at which alpha reaches its floor.
 fn reach(splat: &Splat, axis: usize) -> f64 {
     let variance = [splat.covariance[0], splat.covariance[2]][axis];
     let square: f64 = 2.0 * (splat.opacity * 255.0).ln().max(0.0) * variance;
@@ -85,7 +85,7 @@ fn boxes_touch(splat: &Splat, corner: [f64; 2]) -> bool {
     })
 }
 
-/// A Gaussian of a tile's list, evaluated everywhere or in the groups in which it reaches a pixel's centre.
+/// A Gaussian of a tile's list, evaluated at all pixels or only in the groups in which it covers a pixel's centre.
 fn primitive(
     splat: &Splat,
     format: Format,
@@ -122,16 +122,16 @@ fn reached(groups: Groups, mean: [f64; 2], [a, b, c]: [f64; 3], opacity: f64) ->
     })
 }
 
-/// Gaussians that a tile may be pressed with.
+/// A kind of generated Gaussians.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// A hundred times as long as wide.
+    /// Gaussians a hundred times as long as wide.
     Needles,
-    /// Nearly opaque, and as large as the tile: lists end.
+    /// Nearly opaque Gaussians as large as the tile, so that pixels saturate before the end of the list.
     Saturated,
-    /// Of all sizes and opacities.
+    /// Gaussians of all sizes and opacities.
     Mixed,
-    /// Small ones in single groups.
+    /// Small Gaussians in single groups.
     Sparse,
 }
 
@@ -193,7 +193,7 @@ pub fn gaussians(
     }
 }
 
-/// A generated list of triangles, some of them needles, that cover some of the tile.
+/// A generated list of triangles, some of them needles, each of which covers a part of the tile.
 pub fn triangles(format: Format, groups: Groups, random: &mut ChaCha8Rng) -> List {
     let count = random.random_range(1..80);
     let mut primitives = Vec::new();
@@ -239,7 +239,7 @@ pub fn triangles(format: Format, groups: Groups, random: &mut ChaCha8Rng) -> Lis
     }
 }
 
-/// Generated lists of every kind, of triangles one in four.
+/// Generated lists of every kind; one in four is of triangles.
 pub fn generated(
     format: Format,
     groups: Groups,

@@ -1,4 +1,4 @@
-//! Gaussians among triangles: where points are in clip coordinates, and what targets hold of them.
+//! Helpers for scenes of Gaussians and triangles: positions in clip coordinates, and the contents of targets.
 
 use ash::vk;
 use gaurast::vk::GaussianCameraGAURAST;
@@ -7,17 +7,17 @@ use glam::{DMat3, DVec3};
 
 use crate::oracle::{OracleDepthFormat, Stored};
 
-/// Takes points of the world to clip coordinates, so that triangles are seen as Gaussians are.
+/// The transform from world space to clip coordinates that makes triangles match Gaussians.
 #[derive(Clone, Copy)]
 pub struct ToClip {
-    /// A pinhole, whose depth coefficients are those of a perspective projection.
+    /// A pinhole camera, whose depth coefficients are those of a perspective projection.
     pub camera: GaussianCameraGAURAST<'static>,
     /// The picture's width and height in pixels.
     pub size: [u32; 2],
 }
 
 impl ToClip {
-    /// A vertex's position.
+    /// The clip coordinates of a vertex.
     pub fn position(&self, point: DVec3) -> [f32; 4] {
         let camera = &self.camera;
         let rotation = DMat3::from_cols_array(&camera.rotation.map(f64::from)).transpose();
@@ -32,12 +32,12 @@ impl ToClip {
     }
 }
 
-/// What a target holds of one sample of each pixel.
+/// The contents of a target at one sample of each pixel.
 #[derive(Clone, Debug, Default)]
 pub struct Held {
     /// The first colour attachment, of four 32-bit floats.
     pub color: Vec<[f32; 4]>,
-    /// Depths, if any, as numbers of their format; and stencils, of one sample a pixel only.
+    /// Depths, if any, as numbers of their format, and stencils. Stencils are present only with one sample per pixel.
     pub stored: Stored,
 }
 
@@ -55,7 +55,7 @@ pub fn depth_format(options: &TargetOptions) -> OracleDepthFormat {
     }
 }
 
-/// What a target holds, sample by sample.
+/// The contents of a target, sample by sample.
 ///
 /// # Panics
 /// If its first colour attachment is not of four 32-bit floats.
@@ -71,7 +71,7 @@ pub fn held(options: &TargetOptions, output: &Output) -> Vec<Held> {
                 let texels = picture.texels::<u32>();
                 texels.into_iter().map(|texel| texel & 0xFF_FFFF).collect()
             }
-            // A depth, or a sample of one that was fetched as a float.
+            // A float depth, or a sample of a depth that was fetched as a float.
             _ => {
                 let texels = picture.texels::<f32>();
                 texels

@@ -1,5 +1,5 @@
-//! What the project's tests share beside their Vulkan application ([`gaurast_testkit`]): compute kernels, programs made
-//! up at random, scenes of triangles, input for fuzzing.
+//! Code that several test programs share, in addition to the Vulkan application [`gaurast_testkit`]: compute kernels,
+//! random programs, scenes of triangles, and input for fuzzing.
 
 pub mod fuzzing;
 pub mod hybrid;

@@ -1,5 +1,5 @@
-//! Thousands of frames on one device, of tiny scenes that come again and again: memory must stay as it is, and so must
-//! every picture, to the bit.
+//! Thousands of frames of small, recurring scenes on one device. Memory must not grow, and every picture must be the
+//! same to the bit each time.
 
 use gaurast::vk::{GaussianAntialiasingGAURAST, GaussianCameraGAURAST, GaussianOrderGAURAST};
 use rand::{Rng, SeedableRng};
@@ -10,16 +10,16 @@ use gaurast_testkit::{
     GaussianOptions, GaussianPipeline, GaussianScene, Gpu, Pass, Settings, Target, over,
 };
 
-/// How many scenes there are.
+/// The number of scenes.
 pub const SCENES: usize = 24;
 
-/// A scene and how it is drawn.
+/// A scene and its draw parameters.
 struct Scene {
     buffers: SceneBuffers,
     camera: GaussianCameraGAURAST<'static>,
     options: GaussianOptions<'static>,
     size: [u32; 2],
-    /// How often it is drawn over itself, in one pass.
+    /// The number of times it is drawn over itself in one pass.
     draws: u32,
 }
 
@@ -75,7 +75,7 @@ impl Scene {
         }
     }
 
-    /// Draws it with objects of its own, all of which are gone afterwards.
+    /// Draws it with objects that are all destroyed afterwards.
     fn draw(&self, gpu: &Gpu) -> Vec<[f32; 4]> {
         let pipeline = GaussianPipeline::new(gpu, &self.options);
         let scene = GaussianScene::new(gpu, &self.buffers);
@@ -92,20 +92,20 @@ impl Scene {
     }
 }
 
-/// What a long run found.
+/// The results of a long run.
 #[derive(Clone, Copy, Debug)]
 pub struct Report {
     /// Frames that were drawn.
     pub frames: usize,
-    /// Bytes of memory that the process held before the first of them, after each quarter and at most; nothing where the
-    /// system doesn't tell.
+    /// Bytes of memory that the process used before the first frame, after each quarter, and at most. `None` if the
+    /// system does not report it.
     pub memory: Option<[u64; 6]>,
 }
 
-/// Draws so many frames; `progress` hears the number of each.
+/// Draws `frames` frames, and calls `progress` with the number of each.
 ///
 /// # Panics
-/// If a scene's picture is ever another than it was at first, or if memory grows by more than 16 MiB.
+/// If a scene's picture differs from its first one, or if memory grows by more than 16 MiB.
 pub fn run(frames: usize, mut progress: impl FnMut(usize)) -> Report {
     let gpu = Gpu::embedded(&Settings {
         threads: Some(2),
@@ -143,7 +143,7 @@ pub fn run(frames: usize, mut progress: impl FnMut(usize)) -> Report {
     Report { frames, memory }
 }
 
-/// Bytes of memory that the process holds (`VmRSS:`) or has held at most (`VmHWM:`), as Linux tells.
+/// Bytes of memory that the process uses (`VmRSS:`) or has used at most (`VmHWM:`), as Linux reports.
 fn memory(what: &str) -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix(what))?;

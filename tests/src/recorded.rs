@@ -1,5 +1,5 @@
-//! Work that devices recorded, and how well the closed form of the rasterizer's timing agrees with the model that steps
-//! every cycle on it.
+//! Compares the fast timing model of the rasterizer with the model that steps every cycle, on work that devices
+//! recorded.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use simdevice::timing::fast;
 use simdevice::timing::work::Trace;
 use timing_studies::stepped;
 
-/// Machines that traces are run on: a preset, and what is changed of it.
+/// Machines on which traces are run: a preset, and its changed parameters.
 const MACHINES: [(&str, &[&str]); 6] = [
     ("paper-15x16", &[]),
     (
@@ -31,19 +31,19 @@ const MACHINES: [(&str, &[&str]); 6] = [
     ("fp16", &["saturation=reached", "port_bytes_per_cycle=4"]),
 ];
 
-/// The trace in a file that a device wrote.
+/// Reads the trace in a file that a device wrote.
 ///
 /// # Panics
-/// If there is none.
+/// If the file is missing or invalid.
 pub fn read(path: &Path) -> Trace {
     let text = std::fs::read(path).expect("the device wrote its trace");
     serde_json::from_slice(&text).expect("a trace")
 }
 
-/// How far the closed form is from the stepped model.
+/// The differences between the fast model and the stepped model.
 #[derive(Default)]
 pub struct Agreement {
-    /// Relative differences of cycles, and what of.
+    /// Relative differences of cycles, and the run of each.
     errors: Vec<(f64, String)>,
 }
 
@@ -51,7 +51,7 @@ impl Agreement {
     /// Runs every frame of a trace through both models on every machine.
     ///
     /// # Panics
-    /// If the models don't agree on what was done.
+    /// If the models do not agree on the amount of work.
     pub fn add(&mut self, name: &str, trace: &Trace) {
         for (number, frame) in trace.frames.iter().enumerate() {
             for (preset, settings) in MACHINES {
@@ -77,10 +77,10 @@ impl Agreement {
         }
     }
 
-    /// Holds the differences against the limits: 2 % at most and 0.5 % on average, over at least `least` runs.
+    /// Checks the differences: 2 % at most and 0.5 % on average, over at least `least` runs.
     ///
     /// # Panics
-    /// If they are not kept.
+    /// If a limit is exceeded.
     pub fn judge(&self, least: usize) {
         let worst = self.errors.iter().max_by(|a, b| a.0.total_cmp(&b.0));
         let (worst, name) = worst.expect("traces of something");

@@ -1,5 +1,5 @@
-//! What each of the device's skips would bring as hardware, in scenes that it draws for this: a document for
-//! `simdevice/timing`.
+//! A study of the device's skips as hardware: the saving of each in scenes that the device draws. It writes a document
+//! for `simdevice/timing`.
 
 use std::fmt::Write as _;
 
@@ -46,7 +46,7 @@ reached, finished and hidden. Rows marked *estimated* take the lists of squares 
 Cycles are those of stage 3; millijoules those of the modules and of main memory, for the modules' bytes.
 ";
 
-/// A scene: its heading, what is in it, and whether the colonnade is.
+/// A scene: its heading, its description, and true if the colonnade is drawn.
 const SCENES: [(&str, &str, bool); 2] = [
     (
         "A garden behind a colonnade",
@@ -60,10 +60,10 @@ const SCENES: [(&str, &str, bool); 2] = [
     ),
 ];
 
-/// Machines: with fifteen modules memory limits, with one the PEs do.
+/// Presets of the hardware: with fifteen modules memory is the bottleneck, with one the PEs are.
 const PRESETS: [&str; 2] = ["paper-15x16", "single-module"];
 
-/// A camera of the garden, with a perspective projection's depths.
+/// The garden's camera with depths of a perspective projection.
 fn to_clip() -> ToClip {
     let camera = gaurast_scene::garden::camera(None, SIZE).expect("a camera");
     let (near, far) = (0.5f32, 1000.0f32);
@@ -74,9 +74,9 @@ fn to_clip() -> ToClip {
     }
 }
 
-/// A wall across the view, and columns before it.
+/// A wall across the view, and columns in front of it.
 fn colonnade(to_clip: &ToClip) -> Vec<Vertex> {
-    // Three steps before the eye; y is up.
+    // The middle of the wall, about three units in front of the eye; y is up.
     let middle = DVec3::new(1.0, 0.0, 2.6);
     let (along, away) = (
         DVec3::new(0.925, 0.0, -0.38),
@@ -98,14 +98,14 @@ fn colonnade(to_clip: &ToClip) -> Vec<Vertex> {
     wall([-4.0, 4.0], 0.75, 0.1, 0.7);
     for column in 0..10 {
         let at = f64::from(column) * 0.7 - 3.2;
-        // Faces of a pillar, one lit, one not.
+        // The faces of a pillar, one lit, one not.
         wall([at, at + 0.2], 3.5, 0.0, 1.0);
         wall([at + 0.2, at + 0.3], 3.5, 0.0, 0.5);
     }
     vertices
 }
 
-/// Draws the garden, with the colonnade or without.
+/// Draws the garden, with or without the colonnade.
 fn draw(gpu: &Gpu, with_colonnade: bool) -> Output {
     let to_clip = to_clip();
     let target = Target::new(
@@ -143,8 +143,8 @@ fn draw(gpu: &Gpu, with_colonnade: bool) -> Output {
     })
 }
 
-/// What drawing one of the scenes is in work, and the picture. At the simplest SIMD level, whose rounding every processor
-/// has.
+/// The recorded work of drawing one of the scenes, and the picture. It uses the simplest SIMD level, whose rounding is
+/// the same on every processor.
 fn work(with_colonnade: bool) -> (FrameWork, Output) {
     let folder = std::env::temp_dir();
     let path = folder.join(format!(
@@ -160,12 +160,12 @@ fn work(with_colonnade: bool) -> (FrameWork, Output) {
     let output = draw(&gpu, with_colonnade);
     drop(gpu);
     let mut trace = read(&path);
-    // The next trace has another name, so that a file left behind misleads nobody.
+    // A file that cannot be removed does no harm, since no later run uses its name.
     let _ = std::fs::remove_file(&path);
     (trace.frames.pop().expect("a frame"), output)
 }
 
-/// A row for each variant; differences are to the row before, or to the first.
+/// Appends a row for each variant. Differences are relative to the row before, or to the first row.
 fn table(out: &mut String, variants: &[WhatIf], to_first: bool) {
     *out += "| | cycles | difference | PEs busy | waiting for memory | modules mJ | memory mJ | difference |\n";
     *out += "|---|---:|---:|---:|---:|---:|---:|---:|\n";
@@ -206,7 +206,7 @@ fn table(out: &mut String, variants: &[WhatIf], to_first: bool) {
     }
 }
 
-/// What there is of a frame.
+/// A description of a frame's work.
 fn described(frame: &FrameWork) -> String {
     let gaussians = frame.draws.last().expect("a draw of Gaussians");
     let sum = |of: fn(&simdevice::timing::work::TileWork) -> u32| {

@@ -1,4 +1,4 @@
-//! Sizes, counts and values at the ends of what there is, and an application that changes how its threads round.
+//! Extreme sizes, counts and values, and applications that change the rounding mode of their threads.
 
 use ash::vk;
 use gaurast::vk::{GaussianCameraGAURAST, GaussianOrderGAURAST, GaussianPrecisionGAURAST};
@@ -57,8 +57,8 @@ fn draw(
     });
 }
 
-/// More primitives than binary32 has integers: those that are seen come last in each instance, at one depth, so that
-/// their order is that of their numbers.
+/// Draws more primitives than binary32 has consecutive integers. The visible ones are the last of each instance and
+/// have the same depth, so that their order is that of their indices.
 #[gaurast_runner::test]
 fn more_than_2_to_the_24_primitives_keep_their_order() {
     const UNSEEN: usize = 32_766;
@@ -81,7 +81,7 @@ fn more_than_2_to_the_24_primitives_keep_their_order() {
     assert!(judged.holds(), "{judged}");
 }
 
-/// Lists of all tiles would have 3.3e8 entries, beyond what is kept of them: tiles find theirs in the sorted sequence.
+/// Complete tile lists would have 3.3e8 entries, more than their limit, so tiles search the sorted sequence instead.
 /// `cargo run -p gaurast-tests --example screen_fillers` draws a million at 8192x8192.
 #[gaurast_runner::test]
 fn thousands_that_fill_a_large_screen_take_bounded_memory() {
@@ -89,7 +89,7 @@ fn thousands_that_fill_a_large_screen_take_bounded_memory() {
     let size = [2048, 2048];
     let one = |index: usize| {
         let color = [0, 1, 2].map(|c| ((index * (3 + c)) % 7) as f32 / 2.0 - 1.5);
-        // Thin enough for tiles to look at several pieces of the sequence.
+        // Faint enough for tiles to read several parts of the sequence.
         gaussian(2.0 + index as f32 * 1e-3, 1e4, 1.0 / 200.0, color)
     };
     let scene = SceneBuffers::new(0, (0..COUNT).map(one));
@@ -98,7 +98,7 @@ fn thousands_that_fill_a_large_screen_take_bounded_memory() {
     let target = Target::floats(&gpu, size);
     draw(&gpu, &scene, &options, &target, Some([0.0; 4]), 1);
     let image: Vec<[f32; 4]> = target.read();
-    // All pixels see the same: the oracle draws one.
+    // All pixels have the same colour, so the oracle draws only one.
     let view =
         OracleCamera::new(&camera(size).principal_point([0.5; 2]), [1, 1]).expect("a camera");
     let reference = render_bounded(&scene.as_oracle(), &view, &OracleState::default());
@@ -109,8 +109,7 @@ fn thousands_that_fill_a_large_screen_take_bounded_memory() {
     assert_eq!(image.iter().position(far), None);
 }
 
-/// A target of half floats takes colours beyond its greatest, alone and over each other, and never holds what is no
-/// number.
+/// Half-float targets get colours above their greatest number, alone and blended, and never hold NaN.
 #[gaurast_runner::test]
 fn half_float_targets_overflow_to_infinity_at_most() {
     let size = [48, 40];
@@ -139,8 +138,8 @@ fn half_float_targets_overflow_to_infinity_at_most() {
     }
 }
 
-/// Colours whose sums overflow, behind what lets nothing through and at alphas that underflow: infinity times nothing would be
-/// no number.
+/// Colours whose sums overflow are drawn behind opaque Gaussians and with alphas that underflow, where infinity times
+/// zero would give NaN.
 #[gaurast_runner::test]
 fn colors_beyond_every_number_leave_numbers() {
     const MOST: f32 = f32::MAX;
@@ -195,22 +194,22 @@ fn colors_beyond_every_number_leave_numbers() {
                 image.as_flattened().iter().all(|c| !c.is_nan()),
                 "{precision:?} {order:?}"
             );
-            // In its own order the opaque one may hide them.
+            // In the order of the draw, the opaque one may hide them.
             let is_bright = image.iter().any(|rgba| rgba[0] > 3e4);
             assert!(is_bright || order == GaussianOrderGAURAST::PRIMITIVE);
         }
     }
 }
 
-/// What an application sets in its own threads' control registers does not reach the device's: denormals of a target stay
-/// what they are.
+/// The application's own floating-point control register does not affect the device: denormals in a target are
+/// preserved.
 #[cfg(target_arch = "x86_64")]
 #[gaurast_runner::test]
 fn flushing_to_zero_changes_nothing() {
-    /// Denormals that are results become zero; those that are operands, too.
+    /// The control bits that flush denormal results, and denormal operands, to zero.
     const FLUSH: u32 = 1 << 15 | 1 << 6;
 
-    /// Changes bits of the thread's control register for as long as it lives.
+    /// Sets bits of the thread's control register until it is dropped.
     struct Control(u32);
 
     impl Control {
@@ -222,7 +221,7 @@ fn flushing_to_zero_changes_nothing() {
 
         fn read() -> u32 {
             let mut control = 0u32;
-            // SAFETY: it stores the register to a variable of its size.
+            // SAFETY: the instruction stores the register to a variable of its size.
             unsafe {
                 std::arch::asm!("stmxcsr [{}]", in(reg) &raw mut control, options(nostack, preserves_flags));
             }
@@ -230,8 +229,8 @@ fn flushing_to_zero_changes_nothing() {
         }
 
         fn write(control: u32) {
-            // SAFETY: all bits but two are what they were, and no exception is unmasked. Nothing in this test computes
-            // with denormals but the device.
+            // SAFETY: only two bits change, and no exception is unmasked. Nothing in this test but the device computes
+            // with denormals.
             unsafe {
                 std::arch::asm!("ldmxcsr [{}]", in(reg) &raw const control, options(nostack, preserves_flags));
             }

@@ -1,5 +1,5 @@
-//! What other renderers of Gaussians are known to get wrong. Each test shows first that the usual formula fails on its scene,
-//! and then that the driver doesn't, at every SIMD level.
+//! Known errors of other renderers of Gaussians. Each test shows first that the usual formula fails on its scene, and
+//! then that the driver is correct, at every SIMD level.
 
 use gaurast::vk::{
     GaussianAntialiasingGAURAST, GaussianCameraGAURAST, PipelineGaussianStateCreateInfoGAURAST,
@@ -36,7 +36,7 @@ fn ordinary() -> Gaussian {
     }
 }
 
-/// Draws at the case's SIMD level, and holds the picture against the oracle.
+/// Draws at the case's SIMD level, and checks the picture with the oracle.
 fn checked(case: &Case, gaussians: &[Gaussian], camera: &Camera, state: &State) -> Image {
     let scene = SceneBuffers::new(0, gaussians.iter().cloned());
     let view = OracleCamera::new(camera, SIZE).expect("a camera");
@@ -66,7 +66,7 @@ fn checked(case: &Case, gaussians: &[Gaussian], camera: &Camera, state: &State) 
     image
 }
 
-/// Checks that a Gaussian shows nowhere, and spoils nothing of another.
+/// Checks that a Gaussian is invisible and does not affect another one.
 fn assert_invisible(case: &Case, what: Gaussian) {
     let state = State::default();
     let alone = checked(case, &[ordinary()], &camera(), &state);
@@ -75,7 +75,8 @@ fn assert_invisible(case: &Case, what: Gaussian) {
     assert!(alone == both);
 }
 
-/// A file's logarithm of a scale may be any number, its exponential infinite, and the radius infinity less infinity.
+/// The logarithm of a scale in a file may be any number. Its exponential may be infinite, and the radius infinity minus
+/// infinity.
 #[gaurast_runner::test(each = simd_levels())]
 fn an_infinite_scale_is_no_radius_of_nan(case: &Case) {
     let scale = 100.0f32.exp();
@@ -90,7 +91,8 @@ fn an_infinite_scale_is_no_radius_of_nan(case: &Case) {
     );
 }
 
-/// Where alpha falls to its floor is at a deviation times the root of `2 ln(opacity / floor)`.
+/// The distance at which alpha reaches its floor is the deviation times the root of `2 ln(opacity / floor)`, which
+/// fails if the opacity is below the floor.
 #[gaurast_runner::test(each = simd_levels())]
 fn an_opacity_below_the_floor_enters_no_logarithm(case: &Case) {
     for opacity in [1.0 / 256.0, 1e-30, 0.0] {
@@ -106,7 +108,7 @@ fn an_opacity_below_the_floor_enters_no_logarithm(case: &Case) {
     }
 }
 
-/// The covariance of a sphere has the eigenvector (xy, lambda - xx), which is zero.
+/// For a sphere, the usual formula of an eigenvector, (xy, lambda - xx), gives zero.
 #[gaurast_runner::test(each = simd_levels())]
 fn a_sphere_has_axes_too(case: &Case) {
     let sphere = Gaussian {
@@ -123,14 +125,14 @@ fn a_sphere_has_axes_too(case: &Case) {
     assert_eq!(xx, yy);
     assert!((xy / xy.hypot(lambda - xx)).is_nan(), "the usual axis");
     let image = checked(case, &[sphere], &camera(), &State::default());
-    // It is round.
+    // The picture of a sphere is round.
     let at = |x: usize, y: usize| image[y * SIZE[0] as usize + x][3];
     for by in 1..20 {
         assert!((at(32 + by, 24) - at(32, 24 + by)).abs() < 1e-6);
     }
 }
 
-/// Perspective divides by a depth of zero.
+/// Perspective divides by the depth, which is zero here.
 #[gaurast_runner::test(each = simd_levels())]
 fn a_gaussian_at_the_camera_divides_by_nothing(case: &Case) {
     for z in [0.0, -0.0, 1e-45, 0.2] {
@@ -144,11 +146,11 @@ fn a_gaussian_at_the_camera_divides_by_nothing(case: &Case) {
     }
 }
 
-/// What opacity is compensated by is the ratio of two determinants, of which the first is the small difference of two
+/// The compensation of opacity is the ratio of two determinants, the first of which is the small difference of two
 /// large products.
 #[gaurast_runner::test(each = simd_levels())]
 fn the_ratio_of_determinants_keeps_its_digits(case: &Case) {
-    // Along a diagonal, a deviation of 2500 pixels; across it and in depth 1/4.
+    // A deviation of 2500 pixels along a diagonal, and of 1/4 across it and in depth.
     let (long, thin) = (200.0f32, 0.02f32);
     let half_turn = std::f32::consts::FRAC_PI_8;
     let needle = Gaussian {
@@ -158,7 +160,7 @@ fn the_ratio_of_determinants_keeps_its_digits(case: &Case) {
         ..ordinary()
     };
     let [a, b] = [long, thin].map(|scale| (FOCAL * scale / 4.0).powi(2));
-    // Rounded to binary32, as a shader holds it.
+    // The values are rounded to binary32, as in a shader.
     let (xx, xy) = (0.5 * (a + b), 0.5 * (a - b));
     let (usual, exact) = (xx * xx - xy * xy, a * b);
     assert!((usual / exact - 1.0).abs() > 0.1, "{usual} {exact}");
@@ -169,8 +171,8 @@ fn the_ratio_of_determinants_keeps_its_digits(case: &Case) {
     assert!((0.2..0.8).contains(&greatest), "{greatest}");
 }
 
-/// Far beside the picture and near the eye's plane, perspective's derivative grows without bound: streaks fan over the
-/// picture unless it is clamped, about the principal point, wherever that is.
+/// Far outside the picture and near the eye's plane, the derivative of perspective has no bound. It must be clamped
+/// about the principal point, or else streaks cross the picture.
 #[gaurast_runner::test(each = simd_levels())]
 fn what_is_far_beside_the_picture_casts_no_fan(case: &Case) {
     let beside = |side: f32| Gaussian {
@@ -198,7 +200,7 @@ fn what_is_far_beside_the_picture_casts_no_fan(case: &Case) {
     }
 }
 
-/// Keys of fewer bits than a depth has put neighbours into the order of the draw.
+/// A sort key with fewer bits than the depth would leave neighbours in the order of the draw.
 #[gaurast_runner::test(each = simd_levels())]
 fn depths_a_bit_apart_are_in_order(case: &Case) {
     let depth = |steps: u32| f32::from_bits(4.0f32.to_bits() + steps);
@@ -217,10 +219,10 @@ fn depths_a_bit_apart_are_in_order(case: &Case) {
     assert!(b > 10.0 * r && r > 0.0, "blue is in front: {r} {b}");
 }
 
-/// Exponentials that are made by shifting bits wrap around where the exponent has no room for the number.
+/// Exponentials that are made by shifting bits wrap around if the exponent overflows.
 #[gaurast_runner::test(each = simd_levels())]
 fn exponentials_have_a_range(case: &Case) {
-    /// 2^x by Schraudolph's way.
+    /// 2^x by Schraudolph's method.
     fn usual(x: f32) -> f32 {
         f32::from_bits(((x + 127.0) * (1 << 23) as f32) as i64 as u32)
     }

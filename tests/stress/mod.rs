@@ -1,5 +1,5 @@
-//! Numerical stress: scenes made to break a renderer, each held against the binary64 oracle, and
-//! properties that every picture has.
+//! Numerical stress tests: scenes that are difficult for renderers, each compared with the binary64 oracle, and
+//! properties of every picture.
 
 mod extremes;
 mod known_failures;

@@ -1,4 +1,4 @@
-//! Properties that pictures have whatever is drawn, on scenes made up at random.
+//! Properties that hold for all pictures, tested on random scenes.
 
 use gaurast::vk::{GaussianCameraGAURAST, GaussianOrderGAURAST, GaussianPrecisionGAURAST};
 use gaurast_runner::{Case, Variant, simd_levels};
@@ -21,8 +21,8 @@ fn camera() -> Camera {
         .principal_point([0.5 * SIZE[0] as f32, 0.5 * SIZE[1] as f32])
 }
 
-/// Gaussians whose coordinates are multiples of 2^-10 below 16, so that moving them by as much as
-/// 2^12 loses nothing, and whose depths differ.
+/// Gaussians at different depths. Their coordinates are multiples of 2^-10 below 16, so that a translation by up to
+/// 2^12 is exact.
 fn scene(seed: u64, count: usize) -> Vec<Gaussian> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut depths: Vec<i32> = (2 * 1024..9 * 1024).collect();
@@ -46,7 +46,7 @@ fn buffers(gaussians: &[Gaussian]) -> SceneBuffers {
     SceneBuffers::new(0, gaussians.iter().cloned())
 }
 
-/// Draws sets of Gaussians one after the other, each over what was drawn before.
+/// Draws sets of Gaussians one after the other, each over the result of the earlier ones.
 fn draw(
     gpu: &Gpu,
     sets: &[&[Gaussian]],
@@ -74,14 +74,14 @@ fn one(gpu: &Gpu, gaussians: &[Gaussian], camera: &Camera) -> Vec<[f32; 4]> {
     draw(gpu, &[gaussians], &GaussianOptions::new(0), camera)
 }
 
-/// Without floors, since those flip whole contributions where rounding differs.
+/// Options without floors, because a floor makes whole contributions depend on rounding.
 fn without_floors() -> GaussianOptions<'static> {
     let mut options = GaussianOptions::new(0);
     options.state = options.state.alpha_floor(0.0).transmittance_floor(0.0);
     options
 }
 
-/// Twice the contract's distance from one truth.
+/// Twice the distance that the contract allows from the exact result.
 const TWO_PICTURES: f32 = 1e-5;
 
 /// The greatest difference of a channel.
@@ -90,7 +90,7 @@ fn distance(a: &[[f32; 4]], b: &[[f32; 4]]) -> f32 {
     pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
 }
 
-/// Few but whole pictures; the seed of a failure is printed.
+/// Few cases, each a whole picture; a failure prints its seed.
 fn cases() -> ProptestConfig {
     ProptestConfig {
         cases: 24,
@@ -102,7 +102,7 @@ fn cases() -> ProptestConfig {
 proptest! {
     #![proptest_config(cases())]
 
-    /// The order of the draw matters for ties only.
+    /// The order of the draw affects only ties.
     #[gaurast_runner::test]
     fn order_does_not_matter(seed: u64, count in 1..150usize) {
         let gpu = Gpu::embedded(&Settings::default()).expect("a device");
@@ -112,7 +112,7 @@ proptest! {
         prop_assert!(sorted == one(&gpu, &gaussians, &camera()));
     }
 
-    /// Where scene and camera are together does not matter, to the last bit where no coordinate is rounded.
+    /// A common translation of scene and camera changes no bit, if no coordinate is rounded.
     #[gaurast_runner::test]
     fn place_does_not_matter(seed: u64, count in 1..150usize, offset in prop::array::uniform3(-4096..4096i32)) {
         let gpu = Gpu::embedded(&Settings::default()).expect("a device");
@@ -128,7 +128,7 @@ proptest! {
         prop_assert!(here == there);
     }
 
-    /// A mirrored scene gives the mirrored picture, to rounding.
+    /// A mirrored scene gives the mirrored picture, up to rounding.
     #[gaurast_runner::test]
     fn mirrors_agree(seed: u64, count in 1..60usize) {
         let gpu = Gpu::embedded(&Settings::default()).expect("a device");
@@ -147,8 +147,7 @@ proptest! {
         prop_assert!(distance <= TWO_PICTURES, "{distance:e}");
     }
 
-    /// A draw cut in two by depth, the near part blended over the far one, is the whole draw, where
-    /// no transmittance ends a pixel.
+    /// A draw can be split by depth and the near part blended over the far part, if no transmittance ends a pixel.
     #[gaurast_runner::test]
     fn a_draw_may_be_cut_by_depth(seed: u64, count in 2..150usize, share in 0.0..1.0f64) {
         let gpu = Gpu::embedded(&Settings::default()).expect("a device");
@@ -164,8 +163,8 @@ proptest! {
         prop_assert!(distance <= TWO_PICTURES, "{distance:e}");
     }
 
-    /// With a floor, each part begins with a transmittance of 1, so the far part may show by as much
-    /// as the floor over the least that a layer can let through.
+    /// With a floor, each part begins with a transmittance of 1. The far part may then contribute as much as the floor
+    /// divided by the least transmittance of a layer.
     #[gaurast_runner::test]
     fn a_cut_shows_no_more_than_the_floor(seed: u64, count in 2..150usize, share in 0.0..1.0f64) {
         let gpu = Gpu::embedded(&Settings::default()).expect("a device");
@@ -176,13 +175,13 @@ proptest! {
         let whole = draw(&gpu, &[&gaussians], &options, &camera());
         let (near, far) = gaussians.split_at((share * count as f64) as usize);
         let parts = draw(&gpu, &[far, near], &options, &camera());
-        // 1e-4 / (1 - 0.99), times 1 in alpha and less in colours: 0.5 + 1.7 / (2 sqrt(pi)) at most.
+        // The bound is 1e-4 / (1 - 0.99), times 1 in alpha and less in colours: at most 0.5 + 1.7 / (2 sqrt(pi)).
         let bound = 1e-2 + 1e-5;
         let distance = distance(&whole, &parts);
         prop_assert!(distance <= bound, "{distance:e}");
     }
 
-    /// How many threads draw changes no bit.
+    /// The number of threads changes no bit.
     #[gaurast_runner::test]
     fn threads_do_not_matter(seed: u64, count in 1..150usize, threads in 2..9usize) {
         let picture = |threads| {
@@ -192,7 +191,8 @@ proptest! {
         prop_assert!(picture(1) == picture(threads));
     }
 
-    /// Where tiles cut a picture doesn't matter: it is the same wherever the viewport is in a larger target.
+    /// The position of tile boundaries has no effect: the picture is the same wherever the viewport is in a larger
+    /// target.
     #[gaurast_runner::test]
     fn tiles_do_not_matter(seed: u64, count in 1..100usize, corner in prop::array::uniform2(0..70u32)) {
         let gpu = Gpu::embedded(&Settings::default()).expect("a device");
@@ -219,7 +219,7 @@ proptest! {
         prop_assert!(distance <= TWO_PICTURES, "{distance:e}");
     }
 
-    /// Draws that make one sorted set are one draw, to the bit.
+    /// Several draws in one sorted set give the same bits as one draw.
     #[gaurast_runner::test]
     fn draws_may_be_merged(seed: u64, count in 1..150u32, cuts in prop::array::uniform2(0.0..1.0f64)) {
         let gpu = Gpu::embedded(&Settings::default()).expect("a device");
@@ -245,7 +245,7 @@ proptest! {
         prop_assert!(whole == target.read::<[f32; 4]>());
     }
 
-    /// Colours are finite and not negative, alpha lies in [0, 1], in both precisions, with floors and without.
+    /// Colours are finite and not negative, and alpha is in [0, 1], in both precisions, with floors and without.
     #[gaurast_runner::test]
     fn pictures_are_sane(seed: u64, count in 1..60usize, binary16: bool, floors: bool, per_pixel: bool) {
         let gpu = Gpu::embedded(&Settings::default()).expect("a device");
@@ -276,12 +276,12 @@ proptest! {
     }
 }
 
-/// The SIMD levels but the simplest.
+/// All SIMD levels except the simplest.
 fn other_levels() -> Vec<Variant> {
     simd_levels().split_off(1)
 }
 
-/// A SIMD level differs from the simplest by rounding alone.
+/// A SIMD level differs from the simplest only by rounding.
 #[gaurast_runner::test(each = other_levels())]
 fn levels_agree(case: &Case) {
     let levels = [gaurast_runner::SIMD_LEVELS[0], case.variant()];

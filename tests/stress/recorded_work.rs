@@ -1,4 +1,4 @@
-//! Both models of the rasterizer's timing over the stress scenes.
+//! Compares both models of the rasterizer's timing on the stress scenes.
 
 use gaurast_testkit::{Gpu, Settings};
 use gaurast_tests::recorded::{Agreement, read};

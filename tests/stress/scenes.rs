@@ -1,5 +1,5 @@
-//! The stress scenes. Each says how far its picture may lie from the oracle's envelope, and why
-//! that much; the limits were written down before anything was measured.
+//! The stress scenes. Each has a limit on the distance of its picture from the oracle's envelope, and the reason for
+//! this limit. The limits were chosen before the measurements.
 
 use gaurast::vk::{
     GaussianAntialiasingGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST,
@@ -15,7 +15,7 @@ pub type Camera = GaussianCameraGAURAST<'static>;
 /// The accuracy contract's distance, per unit of the greatest colour where that is above 1.
 const CONTRACT: f64 = 5e-6;
 
-/// A scene, how it is seen, and how far the picture may be off.
+/// A scene, its camera, and the limit on the picture's error.
 #[derive(Clone)]
 pub struct Stress {
     pub name: &'static str,
@@ -25,9 +25,9 @@ pub struct Stress {
     pub size: [u32; 2],
     /// Greatest distance of a channel from the oracle's envelope.
     pub limit: f64,
-    /// Why the limit is what it is.
+    /// The reason for the limit.
     pub reason: &'static str,
-    /// Whether all of it must be invisible.
+    /// True if the whole scene must be invisible.
     pub is_empty: bool,
 }
 
@@ -132,7 +132,7 @@ fn many(seed: u64, count: usize, change: impl Fn(&mut ChaCha8Rng, &mut Gaussian)
     (0..count).map(one).collect()
 }
 
-/// `count` layers of one opacity in front of each other, each wider than the picture.
+/// `count` layers in front of each other, each wider than the picture.
 fn layers(count: usize, opacity: impl Fn(usize) -> f32) -> Vec<Gaussian> {
     let one = |index: usize| {
         let z = 2.0 + index as f32 * 1e-3;
@@ -162,7 +162,7 @@ pub fn all() -> Vec<Stress> {
     all
 }
 
-/// Needles, pancakes, giants, dust, and what is hardly a Gaussian any more.
+/// Needles, pancakes, very large, very small and degenerate Gaussians.
 fn shapes() -> Vec<Stress> {
     let scaled = |name, seed, scale: fn(&mut ChaCha8Rng) -> [f32; 3]| {
         let gaussians = many(seed, 200, |rng, g| g.scale = scale(rng));
@@ -223,7 +223,7 @@ fn compensated(state: State) -> State {
     state.antialiasing(GaussianAntialiasingGAURAST::OPACITY_COMPENSATED)
 }
 
-/// Centres at the eye, at the near plane and behind it; ties; far from the origin.
+/// Centres at the eye, at the near plane and behind it; equal depths; centres far from the origin.
 fn depths() -> Vec<Stress> {
     let next = |z: f32, steps: u32| f32::from_bits(z.to_bits() + steps);
     let at = |z: f32| gaussian([0.01, -0.02, z], [0.05; 3], 0.7);
@@ -411,7 +411,7 @@ fn attributes() -> Vec<Stress> {
     for value in values {
         for slot in 0..23 {
             let mut one = plain();
-            // Each at a place of its own, unless that is what is changed.
+            // Each has a different position, unless the position is what is changed.
             one.position[0] += (extremes.len() % 16) as f32 * 0.2 - 1.6;
             one.position[1] += (extremes.len() / 16) as f32 * 0.2 - 1.6;
             match slot {
@@ -424,7 +424,7 @@ fn attributes() -> Vec<Stress> {
             extremes.push(one);
         }
     }
-    // Colours beyond any target's are for another scene: here they would hide everything.
+    // Colours above the range of all targets are in another scene, because they would hide everything here.
     let is_mild = |g: &Gaussian| {
         let colors = g.sh.as_flattened().iter();
         colors.clone().all(|c| !c.is_finite() || c.abs() < 1e19)
@@ -447,7 +447,7 @@ fn attributes() -> Vec<Stress> {
     ]
 }
 
-/// Fields of view, principal points, unequal focal lengths, rotations that are none, sizes.
+/// Fields of view, principal points, unequal focal lengths, non-orthogonal rotations, sizes.
 fn cameras() -> Vec<Stress> {
     let cloud = |seed| many(seed, 200, |_, _| {});
     let scene = |name, seed| Stress::new(name, BY_CONTRACT, cloud(seed));

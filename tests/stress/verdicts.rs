@@ -1,4 +1,4 @@
-//! Every stress scene at every SIMD level against the oracle.
+//! Compares every stress scene at every SIMD level with the oracle.
 
 use gaurast_runner::{Case, simd_levels};
 use gaurast_testkit::for_levels::ForLevels;
@@ -30,7 +30,7 @@ pub fn draw(gpu: &Gpu, stress: &Stress) -> Vec<[f32; 4]> {
     target.read()
 }
 
-/// What holds of every picture, whatever is drawn.
+/// Checks the properties that hold for every picture.
 fn assert_sane(name: &str, image: &[[f32; 4]]) {
     for (index, pixel) in image.iter().enumerate() {
         let is_sane = pixel.iter().all(|c| c.is_finite() && *c >= 0.0) && pixel[3] <= 1.0;
@@ -77,8 +77,8 @@ fn every_scene_keeps_its_limit(case: &Case) {
     assert!(failures.is_empty(), "{failures:#?}");
 }
 
-/// binary16 is defined to the bit: its limit is zero, beyond what the last digits of a mean, a covariance or a colour
-/// may round to.
+/// binary16 is defined to the bit. Its limit is therefore zero, apart from the roundings that the last digits of a
+/// mean, a covariance or a colour allow.
 #[gaurast_runner::test(each = simd_levels())]
 fn binary16_is_as_defined(case: &Case) {
     static REFERENCES: ForLevels<Reference> = ForLevels::new();

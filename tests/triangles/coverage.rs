@@ -1,4 +1,4 @@
-//! Which samples triangles cover: a million of all kinds, clipped ones, and meshes.
+//! The coverage of samples by triangles: a million triangles of all kinds, clipped triangles, and meshes.
 
 use gaurast_runner::{Case, Need, Variant, shards};
 use gaurast_testkit::Gpu;
@@ -14,10 +14,10 @@ use crate::GLSLANG;
 
 type Triangle = [[f32; 4]; 3];
 
-/// Pixels of the square target.
+/// The side of the square target in pixels.
 const SIZE: u32 = 512;
 
-/// Where the samples of a pixel are, in sixteenths of it: one sample, or four.
+/// The sample positions in a pixel, in sixteenths, for one sample or four.
 fn places(samples: u32) -> &'static [[u32; 2]] {
     match samples {
         1 => &[[8, 8]],
@@ -25,7 +25,7 @@ fn places(samples: u32) -> &'static [[u32; 2]] {
     }
 }
 
-/// A kind of triangle: three points in pixels.
+/// A generator of triangles of one kind: three points in pixels.
 type Kind = fn(&mut ChaCha8Rng) -> [[f32; 2]; 3];
 
 fn around(rng: &mut ChaCha8Rng, radius: f32) -> [[f32; 2]; 3] {
@@ -56,12 +56,12 @@ fn huge(rng: &mut ChaCha8Rng) -> [[f32; 2]; 3] {
     [0; 3].map(|_| [0; 2].map(|_| rng.random_range(0.0..SIZE as f32)))
 }
 
-/// Vertices and edges on samples, between pixels, and on the borders.
+/// Triangles with vertices and edges on samples, between pixels, and on the borders.
 fn aligned(rng: &mut ChaCha8Rng) -> [[f32; 2]; 3] {
     around(rng, 12.0).map(|point| point.map(|c| (8.0 * c).round() / 8.0))
 }
 
-/// No area: two corners the same, or three in a line.
+/// Triangles without area: two corners are equal, or all are on a line.
 fn degenerate(rng: &mut ChaCha8Rng) -> [[f32; 2]; 3] {
     let [a, b, _] = aligned(rng);
     if rng.random() {
@@ -71,7 +71,7 @@ fn degenerate(rng: &mut ChaCha8Rng) -> [[f32; 2]; 3] {
     }
 }
 
-/// From pixels to clip coordinates, with or without perspective.
+/// Converts pixels to clip coordinates, with or without perspective.
 fn to_triangle(rng: &mut ChaCha8Rng, points: [[f32; 2]; 3]) -> Triangle {
     let perspective: bool = rng.random();
     points.map(|[x, y]| {
@@ -82,13 +82,13 @@ fn to_triangle(rng: &mut ChaCha8Rng, points: [[f32; 2]; 3]) -> Triangle {
         } else {
             1.0
         };
-        // What rounding might put outside is moved back.
+        // A coordinate that rounding would put outside is clamped.
         let clip = |pixel: f32| ((pixel - half) / half * w).clamp(-w, w);
         [clip(x), clip(y), z * w, w]
     })
 }
 
-/// Triangles within the view volume, and how many of each kind there are per thousand.
+/// Triangles within the view volume, of all kinds in fixed proportions.
 fn unclipped(seed: u64, count: usize) -> Vec<Triangle> {
     const KINDS: [(Kind, u32); 6] = [
         (sub_pixel, 4000),
@@ -138,7 +138,8 @@ fn assert_equal(ours: &Gpu, theirs: &Gpu, triangles: &[Triangle], samples: u32) 
     panic!("{different} samples differ; {}", first.unwrap_or_default());
 }
 
-/// A quarter of a million triangles: in parts, memory and the search for a culprit stay small.
+/// Tests a quarter of a million triangles. The million is divided, so that memory and the search for a wrong triangle
+/// are small.
 fn quarter_of_a_million(case: &Case, samples: u32) {
     let triangles = unclipped(200 + case.shard().index as u64, 250_000);
     assert_equal(own(), lavapipe(), &triangles, samples);
@@ -154,10 +155,10 @@ fn a_million_triangles_cover_the_same_samples(case: &Case) {
     quarter_of_a_million(case, 4);
 }
 
-/// Pixels of the square target for clipped triangles.
+/// The side of the square target in pixels, for clipped triangles.
 const SMALL: u32 = 256;
 
-/// Makes a corner of a triangle that some planes cut.
+/// A generator of a corner of a triangle that some planes cut.
 type Plane = fn(&mut ChaCha8Rng) -> Position;
 
 /// Triangles that some planes cut, in units of 1/64.
@@ -168,7 +169,7 @@ fn clipped(seed: u64, count: usize, plane: Plane) -> Vec<[Position; 3]> {
         .collect()
 }
 
-/// A position with `w` in sixteenths to four, `x` and `y` within the sides unless `wide`.
+/// A random position with `w` between 1/16 and 4, and with `x` and `y` inside the side planes, unless `wide` is set.
 fn position(rng: &mut ChaCha8Rng, wide: [bool; 2]) -> Position {
     let w = rng.random_range(32..256);
     let [x, y] = wide.map(|wide| {
@@ -196,7 +197,7 @@ fn near_plane(rng: &mut ChaCha8Rng) -> Position {
     [x, y, rng.random_range(-w..w), w]
 }
 
-/// Some corners are behind the eye, as a perspective projection would put them.
+/// A random position, for some corners behind the eye, as a perspective projection gives it.
 fn behind_the_eye(rng: &mut ChaCha8Rng) -> Position {
     let w = rng.random_range(-128..256);
     let [x, y] = [0; 2].map(|_| rng.random_range(-256..=256));
@@ -210,8 +211,8 @@ fn all_planes(rng: &mut ChaCha8Rng) -> Position {
     [x, y, w - 32 + rng.random_range(-8..=8), w]
 }
 
-/// Whether the triangles whose edges pass the sample explain how the sums differ: some of them are
-/// there on one device only.
+/// True if triangles with an edge near the sample explain the difference of the sums: some of them cover the sample on
+/// one device only.
 fn is_explained(
     triangles: &[[Position; 3]],
     place: [u32; 2],
@@ -231,7 +232,7 @@ fn is_explained(
     is_sum(&near, difference)
 }
 
-/// Whether some of `numbers`, each added or subtracted, make `sum`.
+/// True if some of `numbers`, each added or subtracted, give `sum`.
 fn is_sum(numbers: &[[f32; 4]], sum: [f32; 4]) -> bool {
     let Some((first, rest)) = numbers.split_first() else {
         return sum == [0.0; 4];
@@ -242,7 +243,7 @@ fn is_sum(numbers: &[[f32; 4]], sum: [f32; 4]) -> bool {
     })
 }
 
-/// Planes of the view volume that triangles are clipped at: a name, a seed, and what makes corners.
+/// The clip planes of the view volume, each with a name, a seed, and a generator of corners.
 const PLANES: [(&str, u64, Plane); 6] = [
     ("left and right", 210, left_and_right),
     ("top and bottom", 211, top_and_bottom),
@@ -301,8 +302,8 @@ fn clipped_triangles_cover_the_same_samples_but_at_edges(case: &Case) {
     }
 }
 
-/// A grid over the whole target whose inner corners are moved, by too little to make a cell concave,
-/// cut along random diagonals.
+/// A grid over the whole target. Its inner corners are moved by so little that no cell becomes concave, and its cells
+/// are cut along random diagonals.
 fn moved_grid(seed: u64, cells: usize) -> Vec<Triangle> {
     let mut rng = shapes::rng(seed);
     let step = 2.0 / cells as f32;
@@ -363,11 +364,11 @@ fn star(seed: u64, per_side: usize) -> Vec<Triangle> {
         .collect()
 }
 
-/// Every sample is covered by one triangle of the mesh.
+/// Checks that every sample is covered by exactly one triangle of the mesh.
 fn assert_watertight(gpu: &Gpu, name: &str, triangles: &[Triangle]) {
     for samples in [1, 4] {
         let count = triangles.len() as u32;
-        // The sums tell which triangle it is: if just one, they are its numbers.
+        // If one triangle covers the sample, the sums are its numbers.
         let known: std::collections::HashSet<_> = (0..count)
             .map(|index| numbers(index).map(f32::to_bits))
             .collect();

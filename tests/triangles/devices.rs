@@ -1,4 +1,4 @@
-//! The devices of this process.
+//! The devices that the tests of this process share.
 
 use std::path::Path;
 use std::sync::LazyLock;
@@ -7,17 +7,17 @@ use gaurast_testkit::Settings;
 use gaurast_testkit::loader::manifest;
 use gaurast_testkit::{Gpu, accurate_lavapipe};
 
-/// The folder where this driver's manifest is while tests run.
+/// The folder of this driver's manifest while tests run.
 const FOLDER: &str = env!("CARGO_TARGET_TMPDIR");
 
-/// This driver, linked into the process.
+/// This driver's device, linked into the process.
 pub fn own() -> &'static Gpu {
     static OWN: LazyLock<Gpu> =
         LazyLock::new(|| Gpu::embedded(&Settings::default()).expect("this driver's device"));
     &OWN
 }
 
-/// This driver, through the loader.
+/// This driver's device, through the loader.
 pub fn loaded() -> &'static Gpu {
     static LOADED: LazyLock<Gpu> = LazyLock::new(|| {
         manifest(Path::new(FOLDER));
@@ -26,13 +26,13 @@ pub fn loaded() -> &'static Gpu {
     &LOADED
 }
 
-/// lavapipe, where `Need::Lavapipe` is met.
+/// lavapipe's device, if `Need::Lavapipe` is met.
 pub fn lavapipe() -> &'static Gpu {
     static LAVAPIPE: LazyLock<Gpu> = LazyLock::new(|| Gpu::lavapipe().expect("lavapipe's device"));
     &LAVAPIPE
 }
 
-/// Has the loader find this driver beside lavapipe, unless the environment says what it finds; and lavapipe sample
+/// Makes the loader find this driver and lavapipe, unless the environment names drivers already. Makes lavapipe sample
 /// textures as accurately as it can.
 ///
 /// # Safety
@@ -43,10 +43,10 @@ pub unsafe fn set_environment() {
         gaurast_runner::lavapipe_manifest(),
     ];
     let drivers = std::env::join_paths(drivers.iter().flatten()).expect("paths without separators");
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller guarantees it.
     unsafe {
         accurate_lavapipe();
-        // The older name is for older loaders.
+        // Older loaders read the second name.
         for variable in ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"] {
             if std::env::var_os(variable).is_none() {
                 std::env::set_var(variable, &drivers);

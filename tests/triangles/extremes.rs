@@ -1,4 +1,4 @@
-//! Triangles at the ends of what there is, held against exact values: horizons, corners far outside, depths one step apart,
+//! Triangles in extreme positions, compared with exact values: horizons, corners far outside, depths one step apart,
 //! thousands of layers in one plane, textures at the edges of their address modes.
 
 use ash::vk;
@@ -11,12 +11,12 @@ use gaurast_tests::triangles::shapes;
 use super::devices::own;
 use crate::GLSLANG;
 
-/// Pixels of the square target.
+/// The side of the square target in pixels.
 const SIZE: usize = 128;
-/// What a fragment shader writes that wants one number.
+/// The format of fragment shaders that write one number.
 const FORMAT: vk::Format = vk::Format::R32_SFLOAT;
 
-/// Draws vertices in order over zeros; the first component of each pixel.
+/// Draws vertices in order over zeros; returns the first component of each pixel.
 fn draw(
     gpu: &Gpu,
     target: &TargetOptions,
@@ -51,7 +51,7 @@ fn quad([a, b, c, d]: [Vertex; 4]) -> [Vertex; 6] {
     [a, b, c, c, b, d]
 }
 
-/// A triangle's first value at all of its pixels.
+/// A pipeline that writes the first value of a triangle at all of its pixels.
 fn flat() -> PipelineOptions<'static> {
     PipelineOptions {
         vertex: "layout(location = 0) in vec4 position;
@@ -67,7 +67,7 @@ fn flat() -> PipelineOptions<'static> {
     }
 }
 
-/// The sum of the values of a pixel's triangles.
+/// A pipeline that adds the values of a pixel's triangles.
 fn additive() -> PipelineOptions<'static> {
     PipelineOptions {
         blend: vec![blend(
@@ -79,8 +79,8 @@ fn additive() -> PipelineOptions<'static> {
     }
 }
 
-/// A ground that begins near the eye's plane, at it or behind it, and ends far away. Its distance is exact to what a 256th of a
-/// pixel is worth, to which corners are rounded, and to binary32's rounding of the distance.
+/// Draws a ground plane that begins in front of the eye's plane, on it or behind it, and extends far away. Its distance
+/// is exact up to two errors: corners are rounded to a 256th of a pixel, and the distance to binary32.
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn grounds_reach_from_the_eye_to_the_horizon() {
     let gpu = own();
@@ -122,8 +122,8 @@ fn grounds_reach_from_the_eye_to_the_horizon() {
     }
 }
 
-/// Two halves of a square whose corners are ever further outside, beyond every guard band, cover each pixel once and the
-/// right side of their edge.
+/// Draws two halves of a square whose corners are increasingly far outside, beyond every guard band. Together they
+/// cover each pixel once, on the correct side of their common edge.
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn corners_far_outside_move_no_edge() {
     let gpu = own();
@@ -152,8 +152,8 @@ fn corners_far_outside_move_no_edge() {
     }
 }
 
-/// A triangle whose sides are ever so far outside the picture, none of them along an axis, covers all of it, and what it
-/// varies is what it is in the middle, where its corners' shares are known.
+/// Draws triangles whose sides are increasingly far outside the picture, none of them parallel to an axis. Each covers
+/// the whole picture, and its varying has the exact value in the middle, where the barycentric coordinates are known.
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn sides_far_outside_leave_no_hole() {
     let gpu = own();
@@ -163,7 +163,7 @@ fn sides_far_outside_leave_no_hole() {
             let [x, y] = corners[number].map(|coordinate| coordinate * far);
             vertex([x, y, 0.5, 1.0], [1.0, 2.0, 4.0][number])
         };
-        // The shares of the three corners in the middle, from the areas of the triangles between it and each side.
+        // The barycentric coordinates of the middle, from the areas of the triangles between it and each side.
         let area = |a: usize, b: usize| {
             let [[ax, ay], [bx, by]] = [corners[a], corners[b]].map(|it| it.map(f64::from));
             ax * by - ay * bx
@@ -181,12 +181,12 @@ fn sides_far_outside_leave_no_hole() {
     }
 }
 
-/// Of planes whose depths are neighbours in the attachment's format, the nearer one is in front, whichever comes first.
+/// Of two planes whose depths are neighbours in the attachment's format, the nearer one is visible in either order.
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn depths_a_step_apart_are_told_apart() {
     let gpu = own();
     let of_bits = |bits: u32, code: u32| (f64::from(code) / f64::from((1u32 << bits) - 1)) as f32;
-    // What binary32 has between two codes of 24 bits is enough below a half.
+    // Below one half, binary32 has enough numbers between two codes of 24 bits.
     let mut cases = Vec::new();
     for code in [0u32, 1, 77, 1 << 20, (1 << 23) - 3] {
         let depths = [of_bits(24, code), of_bits(24, code + 1)];
@@ -222,8 +222,8 @@ fn depths_a_step_apart_are_told_apart() {
     }
 }
 
-/// Thousands of triangles in one slanted plane have the same depths, to the bit: all of them pass, the first one, or the
-/// last one, as the comparison says.
+/// Thousands of triangles in one slanted plane have the same depths to the bit. All of them pass, or the first, or the
+/// last, depending on the comparison.
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn layers_in_one_plane_have_one_depth() {
     let gpu = own();
@@ -264,12 +264,12 @@ fn layers_in_one_plane_have_one_depth() {
     }
 }
 
-/// Texels of the row that is sampled.
+/// The number of texels of the sampled row.
 const TEXELS: i64 = 8;
-/// What is beyond a border of opaque white.
+/// The value beyond the edge with a border of opaque white.
 const BORDER: f64 = 1.0;
 
-/// The texel that an address mode makes of a number, as Vulkan's tables have it; `None` is the border.
+/// The texel that an address mode selects for an index, as in Vulkan's tables; `None` is the border.
 fn texel(mode: vk::SamplerAddressMode, index: i64) -> Option<i64> {
     use vk::SamplerAddressMode as Mode;
     let mirror = |n: i64| if n >= 0 { n } else { -1 - n };
@@ -282,8 +282,8 @@ fn texel(mode: vk::SamplerAddressMode, index: i64) -> Option<i64> {
     }
 }
 
-/// Coordinates at, beside and far beyond the edges of texels, in every mode, by both filters: weights that are exact in
-/// sixteenths leave nothing to rounding.
+/// Samples at, near and far beyond the edges of texels, in every mode, with both filters. Weights are exact in
+/// sixteenths, so that nothing is rounded.
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn textures_are_exact_at_the_edges_of_their_modes() {
     use vk::SamplerAddressMode as Mode;
@@ -313,7 +313,8 @@ fn textures_are_exact_at_the_edges_of_their_modes() {
                 .border_color(vk::BorderColor::FLOAT_OPAQUE_WHITE);
             let sampler = Sampler::new(gpu, &sampler);
             let bindings = Bindings::new(gpu, &[Resource::Texture(image.view, sampler.raw)]);
-            // The picture's rows are further and further away, by whole turns and by what is no number.
+            // The rows of the picture are increasingly far away, by whole periods; some coordinates are NaN or
+            // infinite.
             let pipeline = PipelineOptions {
                 fragment: Some(
                     "layout(set = 0, binding = 0) uniform sampler2D image;
@@ -336,7 +337,7 @@ fn textures_are_exact_at_the_edges_of_their_modes() {
                 let drawn = f64::from(drawn);
                 let far = [0.0, 2.0, -2.0, 64.0, -4096.0].get(y / 16);
                 let Some(far) = far else {
-                    // Some texel, or the border.
+                    // The value is that of some texel or of the border.
                     let range = value(0) - 1e-6..=BORDER + 1e-6;
                     assert!(
                         range.contains(&drawn),

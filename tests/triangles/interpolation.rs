@@ -1,5 +1,4 @@
-//! Values between vertices, held against exact ones: what lavapipe does not do exactly enough to be
-//! the measure.
+//! Interpolated values, compared with exact ones. lavapipe's values are not accurate enough for a comparison.
 
 use ash::vk;
 use gaurast_runner::Need;
@@ -14,12 +13,12 @@ use rand::Rng;
 use super::devices::{lavapipe, own};
 use crate::GLSLANG;
 
-/// Corners at whole pixels of 128, so that no rounding moves them, with strong perspective.
+/// Corners at whole pixels of 128, which rounding does not move, with strong perspective.
 const PIXELS: [[f64; 2]; 3] = [[4.0, 9.0], [124.0, 17.0], [33.0, 120.0]];
 const W: [f64; 3] = [1.0, 4.0, 0.5];
 const VALUES: [f64; 3] = [0.0, 1.0, 0.25];
 
-/// Where the four samples of a pixel are.
+/// The positions of the four samples in a pixel.
 const PLACES: [[f64; 2]; 4] = [
     [0.375, 0.125],
     [0.875, 0.375],
@@ -27,8 +26,8 @@ const PLACES: [[f64; 2]; 4] = [
     [0.625, 0.875],
 ];
 
-/// The value at a point in pixels, in binary64, and whether the point is inside by `margin` of a
-/// barycentric coordinate.
+/// The value at a point in pixels, in binary64, and true if the point is inside by a `margin` in barycentric
+/// coordinates.
 fn exact(x: f64, y: f64, margin: f64) -> (f64, bool) {
     let area = |a: [f64; 2], b: [f64; 2]| (a[0] - x) * (b[1] - y) - (a[1] - y) * (b[0] - x);
     let [a, b, c] = PIXELS;
@@ -55,7 +54,7 @@ fn vertices() -> Vec<Vertex> {
     (0..3).map(corner).collect()
 }
 
-/// The greatest error of any pixel inside, for one sample at a place in the pixel.
+/// The greatest error of all pixels inside, for a sample at the given position in the pixel.
 fn greatest_error(values: &[f32], [dx, dy]: [f64; 2]) -> f64 {
     let mut greatest = 0.0f64;
     let mut inside = 0;
@@ -119,7 +118,7 @@ fn perspective_is_exact_at_samples() {
     }
 }
 
-/// Along a line a value changes with the projection onto it, whatever the sample's distance from it.
+/// Along a line, a value depends on the projection of the sample onto the line, not on its distance from it.
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn lines_are_exact_at_samples() {
     let gpu = own();
@@ -139,7 +138,7 @@ fn lines_are_exact_at_samples() {
         ..PipelineOptions::default()
     };
     let pipeline = Pipeline::new(gpu, &target, &options);
-    // From (10, 20) to (110, 60), in pixels of 128.
+    // The line from (10, 20) to (110, 60), in pixels of 128.
     let ends = [[10.0f32, 20.0, 1.0], [110.0, 60.0, 2.0]].map(|[x, y, value]| Vertex {
         position: [x / 64.0 - 1.0, y / 64.0 - 1.0, 0.5, 1.0],
         color: [value; 4],
@@ -159,7 +158,7 @@ fn lines_are_exact_at_samples() {
             let (x, y) = (f64::from(index % 128) + dx, f64::from(index / 128) + dy);
             let along = ((x - 10.0) * 100.0 + (y - 20.0) * 40.0) / 11_600.0;
             let error = (f64::from(value) - 1.0 - along).abs();
-            // A 256th of a pixel, to which the ends are rounded, along a line of 107.7.
+            // The bound is 1/256 of a pixel, to which the ends are rounded, on a line of length 107.7.
             assert!(error <= 3.6e-5, "({x}, {y}): {error:e}");
             covered += 1;
         }
@@ -167,14 +166,15 @@ fn lines_are_exact_at_samples() {
     assert!(covered > 200, "only {covered} samples are covered");
 }
 
-/// A triangle of pixels, depths and a number, of corners that no rounding moves.
+/// A thin triangle with positions in pixels and depths. Rounding does not move its corners.
 struct Sliver {
     pixels: [[f64; 2]; 3],
     depths: [f32; 3],
 }
 
 impl Sliver {
-    /// Corners on the grid of 256ths within 120 pixels, the third one almost on the others' line.
+    /// A sliver with corners on the grid of 1/256 pixel within 120 pixels. The third corner is almost on the line of
+    /// the others.
     fn random(rng: &mut impl Rng) -> Self {
         let grid = |value: f64| (256.0 * value).round() / 256.0;
         let [a, b] = [0; 2].map(|_| [0; 2].map(|_| grid(rng.random_range(4.0..124.0))));
@@ -200,7 +200,7 @@ impl Sliver {
         weighted.sum::<f64>() / areas.iter().sum::<f64>()
     }
 
-    /// Its corners, with its number as a colour.
+    /// Its vertices, with `number` as a colour.
     fn vertices(&self, number: usize) -> [Vertex; 3] {
         [0, 1, 2].map(|index| {
             let [x, y] = self.pixels[index].map(|pixel| (pixel / 64.0 - 1.0) as f32);
@@ -212,7 +212,7 @@ impl Sliver {
     }
 }
 
-/// The greatest error of a depth among slivers that a device drew, and how many pixels there were.
+/// The greatest error of the depth of slivers that a device drew, and the number of their pixels.
 fn greatest_error_of_slivers(gpu: &Gpu, slivers: &[Sliver]) -> (f64, usize) {
     let options = TargetOptions {
         depth: Some(vk::Format::D32_SFLOAT),
@@ -269,10 +269,10 @@ fn slivers() -> Vec<Sliver> {
     (0..3000).map(|_| Sliver::random(&mut rng)).collect()
 }
 
-/// The greatest error of a depth that this driver may make.
+/// The greatest error of a depth that is allowed for this driver.
 const SLIVERS: f64 = 4e-6;
 
-/// The steeper a plane, the more of its depth is lost where it is evaluated carelessly.
+/// The depths of steep planes are accurate. The steeper a plane, the more digits a careless evaluation loses.
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn depths_of_slivers_are_exact() {
     let (error, pixels) = greatest_error_of_slivers(own(), &slivers());
@@ -280,7 +280,8 @@ fn depths_of_slivers_are_exact() {
     assert!(error <= SLIVERS, "{error:e}");
 }
 
-/// It is here that pictures differ from lavapipe's, as `expected_failures/triangles.txt` says: lavapipe is further off.
+/// lavapipe's depths are further from the exact ones, so pictures differ from lavapipe's, as
+/// `expected_failures/triangles.txt` says.
 #[gaurast_runner::test(needs = [GLSLANG, Need::Lavapipe])]
 fn depths_of_slivers_are_less_exact_on_lavapipe() {
     let (error, pixels) = greatest_error_of_slivers(lavapipe(), &slivers());

@@ -1,4 +1,4 @@
-//! Triangles, held against lavapipe's.
+//! Triangles, compared with lavapipe's and with exact values.
 
 mod coverage;
 pub mod devices;

@@ -1,4 +1,4 @@
-//! Every scene on this driver by both doors, and on lavapipe.
+//! Draws every scene on this driver, embedded and through the loader, and on lavapipe.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -13,7 +13,7 @@ use gaurast_tests::triangles::{Expected, Scene, scenes};
 use super::devices::{lavapipe, loaded, own};
 use crate::GLSLANG;
 
-/// Draws a scene, and says in words why it can't be.
+/// Draws a scene, or returns the reason for which it cannot be drawn.
 fn try_draw(scene: &Scene, gpu: &Gpu) -> Result<Output, String> {
     match catch_unwind(AssertUnwindSafe(|| (scene.draw)(gpu))) {
         Ok(Ok(output)) => Ok(output),
@@ -43,7 +43,8 @@ fn each_scene() -> Vec<Variant> {
     scenes::ALL.iter().map(variant).collect()
 }
 
-/// This driver draws the same bits by both doors, and what lavapipe draws but for the exceptions.
+/// This driver draws the same bits embedded and through the loader, and the same picture as lavapipe except for the
+/// listed differences.
 #[gaurast_runner::test(needs = [GLSLANG, Need::VulkanLoader], each = each_scene())]
 fn drivers_agree(case: &Case) {
     let scene = scenes::find(case.variant()).expect("a scene");
@@ -66,7 +67,7 @@ fn drivers_agree(case: &Case) {
     }
 }
 
-/// Both doors draw the same bits, or fail both.
+/// Checks that both draw the same bits, or that both fail.
 fn assert_same(embedded: &Result<Output, String>, loaded: &Result<Output, String>) {
     let (embedded, loaded) = match (embedded, loaded) {
         (Ok(embedded), Ok(loaded)) => (embedded, loaded),
@@ -81,7 +82,7 @@ fn assert_same(embedded: &Result<Output, String>, loaded: &Result<Output, String
     }
 }
 
-/// Writes what both drew to the folder that `GAURAST_TRIANGLE_PICTURES` names, if it does.
+/// Writes both pictures to the folder that `GAURAST_TRIANGLE_PICTURES` names, if it is set.
 fn show(name: &str, ours: &Result<Output, String>, theirs: &Output) {
     let Some(folder) = std::env::var_os("GAURAST_TRIANGLE_PICTURES") else {
         return;
@@ -97,7 +98,7 @@ fn show(name: &str, ours: &Result<Output, String>, theirs: &Output) {
     }
 }
 
-/// Compares what this driver drew with what lavapipe drew; the error names what no exception excuses.
+/// Compares this driver's pictures with lavapipe's. The error describes the differences that no exception permits.
 fn judge(name: &str, ours: Result<Output, String>, theirs: &Output) -> Result<(), String> {
     let ours = ours?;
     let found = differences(&ours, theirs);

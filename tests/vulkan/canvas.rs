@@ -1,5 +1,5 @@
-//! What points, lines and triangles are drawn on: an image, perhaps with depth and stencil, and passes over it; and
-//! pipelines that draw them, to be changed before they are created.
+//! A canvas for points, lines and triangles: an image, with depth and stencil if needed, passes over it, and pipelines,
+//! whose options may be changed before they are created.
 
 use ash::vk;
 use gaurast_testkit::{
@@ -46,20 +46,20 @@ pub fn colored() -> Graphics<'static> {
     }
 }
 
-/// What passes clear colour to.
+/// The clear colour of passes.
 pub const CLEAR: [f32; 4] = [0.25, 0.25, 0.25, 0.0];
 
-/// What passes clear depth to; stencil is cleared to 0.
+/// The clear depth of passes; stencil is cleared to 0.
 pub const CLEAR_DEPTH: f32 = 0.5;
 
 pub const RED: [f32; 4] = [1.0, 0.0, 0.0, 1.0];
 pub const GREEN: [f32; 4] = [0.0, 1.0, 0.0, 0.5];
 pub const BLUE: [f32; 4] = [0.0, 0.0, 1.0, 0.25];
 
-/// How many pixels a canvas has.
+/// The number of pixels of a canvas.
 pub const PIXELS: usize = (WIDTH * HEIGHT) as usize;
 
-/// A triangle that covers everything.
+/// A triangle that covers the whole canvas.
 pub fn everything(color: [f32; 4]) -> [Vertex; 3] {
     [
         vertex(-1.0, -1.0, color),
@@ -68,12 +68,12 @@ pub fn everything(color: [f32; 4]) -> [Vertex; 3] {
     ]
 }
 
-/// How many pixels are of a colour.
+/// The number of pixels of a colour.
 pub fn count(pixels: &[[f32; 4]], color: [f32; 4]) -> usize {
     pixels.iter().filter(|pixel| **pixel == color).count()
 }
 
-/// A device and an image that it draws on.
+/// A device and an image on which it draws.
 pub struct Canvas {
     pub gpu: Gpu,
     pub image: Image,
@@ -112,7 +112,7 @@ impl Canvas {
         self.image.colors()
     }
 
-    /// Draws vertices once each.
+    /// Draws vertices as one instance.
     pub fn draw_vertices(&self, request: &Graphics<'_>, vertices: &[Vertex]) -> Vec<[f32; 4]> {
         self.draw(request, vertices, |device, commands, _| {
             // SAFETY: see the crate.
@@ -120,7 +120,7 @@ impl Canvas {
         })
     }
 
-    /// Draws by a pipeline of its own what `record` records, over bound vertices.
+    /// Creates a pipeline and draws the commands of `record` with it, with vertices bound.
     pub fn draw(
         &self,
         request: &Graphics<'_>,
@@ -130,7 +130,7 @@ impl Canvas {
         self.draw_of(request, vertices.as_flattened(), record)
     }
 
-    /// Draws by a pipeline of its own what `record` records, over a bound vertex buffer.
+    /// Creates a pipeline and draws the commands of `record` with it, with a vertex buffer bound.
     pub fn draw_of<T: bytemuck::NoUninit>(
         &self,
         request: &Graphics<'_>,
@@ -227,7 +227,7 @@ impl Canvas {
         unsafe { device.cmd_end_rendering(commands) };
     }
 
-    /// A sampler that filters nothing.
+    /// A sampler with nearest filtering.
     pub fn nearest_sampler(&self) -> Sampler {
         Sampler::new(&self.gpu, &vk::SamplerCreateInfo::default())
     }

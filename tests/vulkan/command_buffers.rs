@@ -1,4 +1,4 @@
-//! Command buffers' lives.
+//! The life cycle of command buffers.
 
 use crate::devices::{image, open};
 use crate::scene::{
@@ -61,7 +61,7 @@ fn command_buffers_are_reset_alone_or_with_their_pool() {
         device.end_command_buffer(commands).unwrap();
         submit().unwrap();
         assert_eq!(buffer.values::<u32>(), [9]);
-        // Beginning resets too.
+        // Beginning a command buffer also resets it.
         device.begin_command_buffer(commands, &begin).unwrap();
         device.end_command_buffer(commands).unwrap();
         let flags = vk::CommandPoolResetFlags::empty();

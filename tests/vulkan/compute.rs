@@ -1,4 +1,4 @@
-//! Dispatches: what kernels see of bindings, constants, workgroups and each other.
+//! Dispatches: kernels read bindings, constants, workgroup numbers, and the results of other workgroups.
 
 use crate::devices::open;
 use crate::spirv;
@@ -101,7 +101,7 @@ fn dynamic_offsets_go_to_their_descriptors_in_order() {
 
     let too_few = gpu.try_record(|recording| {
         let (device, commands) = recording.raw();
-        // SAFETY: it is invalid usage, which the driver must survive.
+        // SAFETY: this is invalid usage, which the driver must survive.
         unsafe {
             device.cmd_bind_descriptor_sets(commands, bind_point, kernel.layout, 0, &[set], &[0]);
         }
@@ -144,7 +144,7 @@ fn specialization_constants_change_the_kernel() {
     assert_eq!((values[8], values[63]), (0.0, 8.0));
 }
 
-/// The workgroups that notes of `groups.comp` are of, sorted, after checking them.
+/// Checks the notes that `groups.comp` wrote, and returns their workgroup numbers, sorted.
 fn noted(target: &Buffer, count: [u32; 3]) -> Vec<[u32; 3]> {
     let words = target.values::<u32>();
     let notes: Vec<_> = words[4..].chunks_exact(4).take(words[0] as usize).collect();
@@ -203,7 +203,7 @@ fn every_workgroup_runs_once_and_knows_its_place() {
         // SAFETY: see the crate.
         unsafe {
             device.cmd_dispatch_indirect(commands, parameters.raw, 4);
-            // Nothing at all.
+            // The parameters are zero: no workgroup runs.
             device.cmd_dispatch_indirect(commands, parameters.raw, 0);
             device.cmd_dispatch(commands, 0, 1, 1);
         }
@@ -257,7 +257,7 @@ fn what_is_out_of_range_reads_zero_and_takes_nothing() {
     let data = Buffer::of(&gpu, &(100..228u32).collect::<Vec<_>>());
     let target = Buffer::new(&gpu, 32 * 12);
     let set = kernel.sets.allocate()[0];
-    // 8 of 128 words are bound, so that the rest shows whether anything is written beyond.
+    // 8 of 128 words are bound, so that a write beyond them would be visible in the rest.
     write(
         &gpu,
         set,

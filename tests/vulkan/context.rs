@@ -1,10 +1,10 @@
-//! An instance and devices of it, for tests of creating them.
+//! An instance and its devices, for tests of their creation.
 
 use ash::vk;
 use gaurast_testkit::Messages;
 use std::ffi::CStr;
 
-/// An instance of the embedded driver. Destroyed when dropped.
+/// An instance of a driver. Dropping it destroys the instance.
 pub struct Context {
     pub entry: ash::Entry,
     pub instance: ash::Instance,
@@ -12,7 +12,7 @@ pub struct Context {
 }
 
 impl Context {
-    /// An instance of the entry's driver, version 1.3, with these extensions.
+    /// Creates an instance of the entry's driver, version 1.3, with these extensions.
     pub fn new(entry: ash::Entry, extensions: &[&CStr]) -> Self {
         let names: Vec<_> = extensions.iter().map(|name| name.as_ptr()).collect();
         let application = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
@@ -41,12 +41,12 @@ impl Context {
         }
     }
 
-    /// An instance of the loader's first driver.
+    /// Creates an instance of the loader's first driver.
     pub fn loaded(extensions: &[&CStr]) -> Self {
         Self::new(loader(), extensions)
     }
 
-    /// An instance of the driver linked into the test.
+    /// Creates an instance of the driver linked into the test.
     pub fn embedded(extensions: &[&CStr]) -> Self {
         Self::new(vulkan_gaurast::entry(), extensions)
     }
@@ -84,7 +84,7 @@ pub fn loader() -> ash::Entry {
     unsafe { ash::Entry::load() }.expect("the system's loader")
 }
 
-/// Creation info of a messenger that keeps everything in `messages`.
+/// Creation info of a messenger that stores all messages in `messages`.
 pub fn everything(messages: &Messages) -> vk::DebugUtilsMessengerCreateInfoEXT<'_> {
     use vk::DebugUtilsMessageSeverityFlagsEXT as Severity;
     messages.messenger_of(Severity::VERBOSE | Severity::INFO | Severity::WARNING | Severity::ERROR)

@@ -1,4 +1,4 @@
-//! Descriptor sets: pools and their limits, updates of every form, and what is refused.
+//! Descriptor sets: pools and their limits, all forms of updates, and invalid uses that are refused.
 
 use crate::devices::open;
 use crate::spirv;
@@ -90,7 +90,7 @@ fn descriptors_are_copied_between_sets() {
             &[whole(&source), whole(&target)],
         );
         let set = kernel.sets.allocate()[0];
-        // Both bindings in one go: the copy spills over from one into the next.
+        // Both bindings in one copy: it continues from one binding into the next.
         let copies = [vk::CopyDescriptorSet::default()
             .src_set(from)
             .src_array_element(1)
@@ -218,7 +218,7 @@ fn descriptors_are_pushed() {
             kernel.push(commands, &[1, 1]);
             push.cmd_push_descriptor_set(commands, bind_point, kernel.layout, 0, &both);
             device.cmd_dispatch(commands, 1, 1, 1);
-            // What isn't pushed again stays.
+            // Descriptors that are not pushed again keep their values.
             kernel.push(commands, &[1, 2]);
             let other = [write(1, &infos[2])];
             push.cmd_push_descriptor_set(commands, bind_point, kernel.layout, 0, &other);
@@ -242,12 +242,12 @@ fn sets_are_read_when_commands_execute() {
     let bindings: &[_] = &[(0, STORAGE, 1), (1, STORAGE, 1)];
     let kernel = Compute::new(&gpu, &spirv!("push_constants.comp"), &[bindings]);
     let buffers = [Buffer::of(&gpu, &[1u32; 64]), Buffer::new(&gpu, 256)];
-    // A dispatch without sets does nothing and is told of.
+    // A dispatch without sets does nothing and gives a message.
     kernel.run(&[], &[1, 1], [1, 1, 1]);
     let messages = gpu.message_texts();
     let told = |message: &String| message.contains("set 0") && message.contains("not bound");
     assert!(messages.iter().any(told), "{messages:?}");
-    // A set that holds nothing reads as zero and takes nothing.
+    // A set without descriptors reads zero, and writes to it have no effect.
     let set = kernel.sets.allocate()[0];
     kernel.run(&[set], &[1, 1], [1, 1, 1]);
     write(&gpu, set, (1, 0), STORAGE, &[whole(&buffers[1])]);
@@ -330,7 +330,7 @@ fn shaders_that_cannot_run_are_refused_with_the_instruction() {
     let whole = spirv!("push_constants.comp");
     refused(&whole[..4], "SPIR-V");
     refused(&whole[..whole.len() - 3], "SPIR-V");
-    // The first OpIMul (132) names an operand that there isn't, then becomes an instruction that there isn't.
+    // The first OpIMul (132) gets an operand that does not exist, and then an opcode that does not exist.
     let multiply = whole
         .iter()
         .position(|&word| word == 5 << 16 | 132)

@@ -1,4 +1,4 @@
-//! Devices to test: this driver's, with all that it supports or less; and images, memory and shaders of tests.
+//! Devices to test: this driver's, with all or some of its features; and images, memory and shaders of tests.
 
 use ash::vk;
 use gaurast::gaussian_primitive_topology;
@@ -25,7 +25,7 @@ pub const COLOR_LAYERS: vk::ImageSubresourceLayers = vk::ImageSubresourceLayers 
     layer_count: 1,
 };
 
-/// What a driver's device is opened with: all that it supports.
+/// The options for opening a driver's device with all that it supports.
 pub const fn everything_of(driver: Driver) -> Opening<'static> {
     Opening {
         all_extensions: true,
@@ -34,7 +34,7 @@ pub const fn everything_of(driver: Driver) -> Opening<'static> {
     }
 }
 
-/// Opens the device with all that it supports.
+/// Opens this driver's device with all that it supports.
 pub fn open() -> Gpu {
     Gpu::open(&everything_of(Driver::Embedded)).expect("a device")
 }
@@ -47,12 +47,12 @@ fn with_features_of_gaussians(features: GaussianFeatures<'static>) -> Gpu {
     Gpu::open(&opening).expect("a device")
 }
 
-/// Opens the device with all that it supports but the optional modes of the extension.
+/// Opens the device with all that it supports, except the optional modes of the extension.
 pub fn without_modes() -> Gpu {
     with_features_of_gaussians(GaussianFeatures::default().gaussian_primitive_topology(true))
 }
 
-/// Opens the device with all that it supports but the Gaussian topology.
+/// Opens the device with all that it supports, except the Gaussian topology.
 pub fn without_the_topology() -> Gpu {
     with_features_of_gaussians(GaussianFeatures::default())
 }
@@ -71,7 +71,7 @@ pub fn allocate(gpu: &Gpu, size: u64, memory_type: u32) -> vk::DeviceMemory {
     unsafe { gpu.device().allocate_memory(&info, None) }.expect("memory")
 }
 
-/// A 2D image that is drawn to; one of colour is sampled and stored to, too.
+/// A 2D image for use as an attachment; a colour image can also be sampled and stored to.
 pub fn image(gpu: &Gpu, format: vk::Format, size: [u32; 2]) -> Image {
     let usage = match format {
         vk::Format::D32_SFLOAT | vk::Format::D16_UNORM => {
@@ -86,7 +86,7 @@ pub fn image(gpu: &Gpu, format: vk::Format, size: [u32; 2]) -> Image {
     Image::new(gpu, &ImageOptions::new(format, size, usage))
 }
 
-/// The SPIR-V of a shader beside the compiler's tests.
+/// The SPIR-V of a shader in the folder of the compiler's tests.
 #[macro_export]
 macro_rules! spirv {
     ($name:literal) => {

@@ -1,4 +1,4 @@
-//! Every dynamic state does what the same static state does, and has an effect.
+//! Every dynamic state has the same effect as the static state, and has an effect.
 
 use crate::canvas::{Canvas, DEPTH_FORMAT, GREEN, RED, Vertex, colored, deep_vertex, vertex};
 use crate::scene::{HEIGHT, WIDTH, replace};
@@ -8,19 +8,19 @@ use vk::DynamicState as S;
 
 const BOTH: vk::StencilFaceFlags = vk::StencilFaceFlags::FRONT_AND_BACK;
 
-/// Two settings of a state, false and true: as a pipeline has them and as a command buffer sets them.
+/// A state with two settings, false and true: in a pipeline, and set by a command buffer.
 struct Case {
     state: S,
-    /// What is drawn.
+    /// The drawn vertices.
     vertices: Vec<Vertex>,
-    /// What is the same for both settings.
+    /// The options that are the same for both settings.
     base: fn(&mut Graphics<'_>),
     fixed: fn(&mut Graphics<'_>, bool),
     dynamic: fn(&ash::Device, vk::CommandBuffer, bool),
 }
 
-/// A small triangle near the upper left corner, and one near the lower right corner that overlaps it and turns the
-/// other way.
+/// A small triangle near the upper left corner, and one near the lower right corner that overlaps it and has the
+/// opposite winding.
 fn two_triangles(depths: [f32; 2]) -> Vec<Vertex> {
     let [a, b] = depths;
     vec![
@@ -45,7 +45,7 @@ fn depth_test(request: &mut Graphics<'_>) {
         .depth_compare_op(vk::CompareOp::LESS);
 }
 
-/// Draws where the stencil is 0, and counts up.
+/// Draws where the stencil is 0, and increments it.
 fn stencil_test(request: &mut Graphics<'_>) {
     request.depth_format = DEPTH_FORMAT;
     request.depth_stencil = request.depth_stencil.stencil_test_enable(true);
@@ -79,7 +79,7 @@ fn cull_back(request: &mut Graphics<'_>) {
     request.raster.cull_mode = vk::CullModeFlags::BACK;
 }
 
-/// A bias that brings depths of one half nearer by about a tenth.
+/// A bias that moves depths of one half nearer by about a tenth.
 fn biased(request: &mut Graphics<'_>) {
     depth_test(request);
     request.raster = request.raster.depth_bias_enable(true);
@@ -105,7 +105,7 @@ fn bounds_test(request: &mut Graphics<'_>) {
         .max_depth_bounds(1.0);
 }
 
-/// Records a command that sets state; the arguments may depend on whether the state is on.
+/// Records a command that sets state. Its arguments may depend on the setting.
 macro_rules! sets {
     ($on:pat => $command:ident($($argument:expr),* $(,)?)) => {
         |device, commands, $on| {
@@ -329,9 +329,9 @@ fn constants(on: bool) -> [f32; 4] {
     if on { [0.5; 4] } else { [0.25, 1.0, 1.0, 1.0] }
 }
 
-/// Draws a case's vertices: one by one, with a restart in the middle.
+/// Draws a case's vertices by indices, with a restart index in the middle.
 fn draw(canvas: &Canvas, case: &Case, request: &Graphics<'_>, set: Option<bool>) -> Vec<[f32; 4]> {
-    // The index that restarts is a vertex like any other where nothing restarts.
+    // Where restart is off, the restart index is an ordinary vertex index.
     let mut vertices = case.vertices.clone();
     vertices.resize(256, vertex(0.9, 0.0, [1.0; 4]));
     let mut order: Vec<u8> = (0..case.vertices.len() as u8).collect();
@@ -366,7 +366,7 @@ fn dynamic_state_is_what_static_state_is() {
         };
         let images = [false, true].map(|on| {
             let fixed = draw(&canvas, &case, &request(on), None);
-            // The pipeline's own value is the other one, and ignored.
+            // The pipeline has the opposite value, which must be ignored.
             let dynamic = request(!on).with_dynamic(case.state);
             let set = draw(&canvas, &case, &dynamic, Some(on));
             assert!(set == fixed, "{:?} {on}", case.state);

@@ -1,4 +1,4 @@
-//! The driver through its embedded door.
+//! Tests of the embedded driver's entry.
 
 use crate::context::{Context, everything};
 use ash::vk;
@@ -241,7 +241,7 @@ fn enumeration_may_be_cut_short() {
         .enumerate_device_extension_properties;
     let mut count = 1;
     let mut extensions = [vk::ExtensionProperties::default(); 2];
-    // SAFETY: there is room for `count` extensions.
+    // SAFETY: the array is large enough for `count` extensions.
     let result = unsafe {
         enumerate(
             context.physical_device,
@@ -330,7 +330,7 @@ fn timelines_are_signalled_by_host_and_queue() {
         assert_eq!(wait(3, 0), Ok(()));
         assert_eq!(wait(4, 1000), Err(vk::Result::TIMEOUT));
 
-        // The queue waits for what the host signals afterwards.
+        // The queue waits for a value that the host signals later.
         let (wait_values, signal_values) = ([4], [7]);
         let mut values = vk::TimelineSemaphoreSubmitInfo::default()
             .wait_semaphore_values(&wait_values)
@@ -378,7 +378,7 @@ fn private_data_is_kept_per_object_and_slot() {
     }
 }
 
-/// A command that isn't there yet fails with a message; it neither aborts nor does something else.
+/// A command that is not implemented yet fails with a message. It neither aborts nor does something else.
 #[gaurast_runner::test]
 fn core_commands_that_do_not_work_yet_fail() {
     let heard = Messages::default();

@@ -23,7 +23,7 @@ fn a_gaussian_is_brightest_at_its_mean() {
     });
     let (x, y) = CENTER;
     assert_close(at(&pixels, CENTER), premultiplied(RED, 0.8));
-    // One pixel away the variance is (100 * 0.1 / 5)^2 + 0.3.
+    // One pixel from the centre, the variance is (100 * 0.1 / 5)^2 + 0.3.
     let alpha = 0.8 * (-0.5f32 / 4.3).exp();
     assert_close(at(&pixels, (x + 1, y)), premultiplied(RED, alpha));
     assert_close(at(&pixels, (x, y - 1)), premultiplied(RED, alpha));
@@ -56,7 +56,7 @@ fn alpha_becomes_coverage_without_a_fragment_stage() {
     });
     let (mut covered, mut left) = (0, 0);
     for (&[r, g, b, alpha], &found) in plain.iter().zip(&covering) {
-        // Of one sample, what is half covered or more.
+        // With one sample, pixels that are at least half covered are written.
         if alpha >= 0.51 {
             assert_eq!(found, [r, g, b, 1.0]);
             covered += 1;
@@ -188,7 +188,7 @@ fn an_index_buffer_picks_gaussians() {
 
 #[gaurast_runner::test]
 fn instances_move_gaussians_by_attributes_of_their_own() {
-    // The position advances by instance, everything else by vertex.
+    // The position advances by instance, all other attributes by vertex.
     let mut request = splats();
     request.bindings.push(vk::VertexInputBindingDescription {
         binding: 5,

@@ -1,4 +1,4 @@
-//! Optional modes of Gaussian draws that change where things come from, and not the picture.
+//! Optional modes of Gaussian draws that change the source of data, but not the picture.
 
 use crate::devices::{gaussian, open};
 use crate::scene::{Scene, Splat, camera, over, pass, splat, splats};
@@ -29,7 +29,7 @@ fn blended() -> Graphics<'static> {
     }
 }
 
-/// Draws the halves one after the other, with something between them.
+/// Draws the two halves one after the other, and records `between` between them.
 fn halves(scene: &Scene, between: impl FnOnce(&ash::Device, vk::CommandBuffer)) -> Vec<[f32; 4]> {
     scene.draw([0.0; 4], |device, commands| {
         // SAFETY: see the crate.
@@ -40,7 +40,7 @@ fn halves(scene: &Scene, between: impl FnOnce(&ash::Device, vk::CommandBuffer)) 
     })
 }
 
-/// As [`halves`], as one set.
+/// Draws as [`halves`] does, in one set.
 fn merged(scene: &Scene, between: impl FnOnce(&ash::Device, vk::CommandBuffer)) -> Vec<[f32; 4]> {
     let gaussian = gaussian(&scene.gpu);
     scene.draw([0.0; 4], |device, commands| {
@@ -67,13 +67,13 @@ fn draws_between_begin_and_end_are_one_sorted_set() {
     });
     assert!(merged(&scene, |_, _| {}) == whole);
     assert!(halves(&scene, |_, _| {}) != whole, "without, each is a set");
-    // Buffers may be bound meanwhile.
+    // Buffers may be bound within a set.
     let bound = merged(&scene, |device, commands| {
         // SAFETY: see the crate.
         unsafe { device.cmd_bind_vertex_buffers(commands, 0, &[scene.splats.raw], &[0]) };
     });
     assert!(bound == whole);
-    // Indirect draws are draws like others.
+    // Indirect draws may be in a set.
     let numbers = Buffer::of(&scene.gpu, &[8u32, 1, 8, 0, 8, 1, 0, 0]);
     let gaussian = gaussian(&scene.gpu);
     let indirect = scene.draw([0.0; 4], |device, commands| {
@@ -88,7 +88,7 @@ fn draws_between_begin_and_end_are_one_sorted_set() {
     assert_eq!(scene.gpu.message_texts(), Vec::<String>::new());
 }
 
-/// No command but the end ends a set.
+/// Only the end command ends a set.
 #[gaurast_runner::test]
 fn innocent_commands_do_not_end_a_set() {
     let scene = Scene::new(&interleaved(), &blended());
@@ -119,7 +119,7 @@ fn innocent_commands_do_not_end_a_set() {
     unsafe { scene.gpu.device().destroy_query_pool(pool, None) };
 }
 
-/// A set is drawn where it ends: what else is drawn within it lies behind it.
+/// A set is drawn at its end, so other draws within it are behind it.
 #[gaurast_runner::test]
 fn a_set_is_drawn_where_it_ends() {
     let scene = Scene::new(&interleaved(), &blended());
@@ -220,7 +220,7 @@ fn the_camera_may_come_from_a_uniform_buffer() {
     };
     let scene = Scene::on(gpu, &interleaved(), &request);
     let moved = camera().eye([0.25, -0.5, 1.0]).focal_length([90.0, 110.0]);
-    // Two cameras, and one that is none.
+    // The bytes of two cameras and of an invalid one.
     let mut bytes = vec![0u8; 1024];
     for (offset, camera) in [
         (0, camera()),
@@ -245,7 +245,7 @@ fn the_camera_may_come_from_a_uniform_buffer() {
         scene.gpu.run(|recording| {
             let (device, commands) = recording.raw();
             pass(device, commands, &scene.image, [0.0; 4], || {
-                // The camera that the command sets is not looked at.
+                // The camera that the command sets is ignored.
                 scene.bind(device, commands);
                 // SAFETY: see the crate.
                 unsafe {

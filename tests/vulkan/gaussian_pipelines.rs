@@ -1,4 +1,4 @@
-//! What Gaussian pipelines refuse, and what they say then.
+//! Invalid Gaussian pipelines that are refused, and the messages about them.
 
 use crate::devices::open;
 use crate::scene::{over, replace, splats};
@@ -11,7 +11,7 @@ use gaurast_testkit::{Gpu, Graphics, Shader};
 
 type State = PipelineGaussianStateCreateInfoGAURAST<'static>;
 
-/// Creates a pipeline and says what became of it.
+/// Creates a pipeline; an error has the result and the messages.
 fn create(gpu: &Gpu, request: &Graphics<'_>) -> Result<(), (vk::Result, String)> {
     let created = request.create(gpu).map(drop);
     created.map_err(|error| (error, gpu.message_texts().concat()))
@@ -125,7 +125,7 @@ fn modes_that_are_not_built_are_refused_by_their_feature() {
         })
     };
     let unused = GAUSSIAN_LOCATION_UNUSED_GAURAST;
-    // Locations 2 and 3 are the rotation's and the opacity's.
+    // Locations 2 and 3 belong to the rotation and the opacity.
     for (request, word) in [
         (placed(2, unused), "firstModelMatrix"),
         (placed(unused, 3), "modelOpacity"),
@@ -171,7 +171,7 @@ fn attributes_must_be_in_the_vertex_input_state() {
     let mut short = splats();
     short.attributes[2].format = vk::Format::R32G32B32_SFLOAT;
     assert_refused(&gpu, &short, error, "fewer than 4 components");
-    // Degree 1 has four coefficients, and only one is there.
+    // Degree 1 has four coefficients, but only one attribute is given.
     let degree1 = with_state(|s| s.spherical_harmonics_degree(1));
     assert_refused(&gpu, &degree1, error, "coefficient 1");
 }
@@ -192,7 +192,7 @@ fn fixed_function_projection_has_no_vertex_stage() {
     request.shaders = vec![stage(vk::ShaderStageFlags::FRAGMENT); 2];
     assert_refused(&gpu, &request, error, "several");
     let text = vk::ShaderModuleCreateInfo::default().code(&[1, 2, 3]);
-    // SAFETY: it is no module, which the driver must survive.
+    // SAFETY: the words are not a valid module, which the driver must survive.
     unsafe { assert!(gpu.device().create_shader_module(&text, None).is_err()) };
 }
 

@@ -1,5 +1,5 @@
-//! Gaussians that a vertex shader projects, and fragments of Gaussians that a fragment shader makes. What a vertex shader
-//! does that does what fixed-function projection does is the same picture.
+//! Gaussians that a vertex shader projects, and fragments of Gaussians that a fragment shader makes. A vertex shader
+//! that computes the same as fixed-function projection gives the same picture.
 
 use crate::canvas::Canvas;
 use crate::devices::{gaussian, image};
@@ -13,15 +13,15 @@ use gaurast::vk::{
 };
 use gaurast_testkit::{Bindings, Buffer, Graphics, Image, Shader};
 
-/// Gaussians of the scene.
+/// The number of Gaussians of the scene.
 const COUNT: u32 = 300;
-/// Floats of a Gaussian but for its spherical harmonics, and of those.
+/// The number of floats of a Gaussian without its spherical harmonics, and the number of those.
 const SHAPE: u32 = 11;
 const HARMONICS: u32 = 48;
 
 type State = PipelineGaussianStateCreateInfoGAURAST<'static>;
 
-/// A number from 0 to 1 that follows from others.
+/// A number from 0 to 1 that depends only on the arguments.
 fn random(index: u32, what: u32) -> f32 {
     let mut x = (index * 64 + what + 1).wrapping_mul(0x9E37_79B9);
     x = (x ^ x >> 15).wrapping_mul(0x85EB_CA6B);
@@ -29,7 +29,7 @@ fn random(index: u32, what: u32) -> f32 {
     (x >> 8) as f32 / (1 << 24) as f32
 }
 
-/// Positions, scales, rotations, opacities.
+/// The Gaussians' positions, scales, rotations and opacities.
 fn shapes() -> Vec<f32> {
     (0..COUNT)
         .flat_map(|index| {
@@ -91,7 +91,7 @@ pub fn outputs() -> GaussianVertexOutputLocationsGAURAST {
         .depth_key(6)
 }
 
-/// A pipeline over the scene's buffers, with a shader or without.
+/// A pipeline over the scene's buffers, with or without a shader.
 pub fn request(shaded: bool) -> Graphics<'static> {
     let mut request = splats();
     request.attributes.truncate(4);
@@ -175,7 +175,7 @@ impl Stage {
         }
     }
 
-    /// The request with the stage and the layout.
+    /// The request with the stage and the layout added.
     fn complete(&self, request: Graphics<'static>) -> Graphics<'static> {
         let shaded =
             |state: &State| state.projection_mode == GaussianProjectionModeGAURAST::VERTEX_SHADER;
@@ -187,7 +187,7 @@ impl Stage {
         }
     }
 
-    /// The request with the layout.
+    /// The request with the layout added.
     fn laid_out(&self, request: Graphics<'static>) -> Graphics<'static> {
         Graphics {
             set_layouts: vec![self.set.layout],
@@ -196,7 +196,7 @@ impl Stage {
         }
     }
 
-    /// The request with a resolve shader, which finds what was accumulated and depths at these locations.
+    /// The request with a resolve shader, which reads the accumulated colour and the depths at these locations.
     fn resolved(
         &self,
         request: Graphics<'static>,
@@ -214,7 +214,7 @@ impl Stage {
         }
     }
 
-    /// What a pipeline draws of the scene; `record` records the draws.
+    /// The picture of the scene by a pipeline; `record` records the draws.
     fn draw(
         &self,
         request: Graphics<'static>,
@@ -241,7 +241,7 @@ impl Stage {
         self.image.colors()
     }
 
-    /// Binds what the shader reads.
+    /// Binds the shader's inputs.
     fn bind(&self, device: &ash::Device, commands: vk::CommandBuffer) {
         let (point, stage) = (
             vk::PipelineBindPoint::GRAPHICS,
@@ -256,7 +256,7 @@ impl Stage {
         }
     }
 
-    /// Draws the scene by both kinds of projection, in the state that `change` makes, and compares.
+    /// Draws the scene with both kinds of projection, in the state that `change` makes, and compares the pictures.
     #[track_caller]
     fn compare(
         &self,
@@ -312,7 +312,7 @@ fn a_vertex_shader_may_do_what_the_device_does() {
     stage.compare("as drawn", |state| state.order(primitive), draw_all);
     let thresholds = |state: State| state.alpha_ceiling(0.7).alpha_floor(0.02);
     stage.compare("thresholds", thresholds, draw_all);
-    // The key that the order is by need not be read.
+    // The depth key may be unused; Gaussians are then sorted by w.
     let w = |state: State| {
         let unused = gaurast::vk::GAUSSIAN_LOCATION_UNUSED_GAURAST;
         state.vertex_output_locations(outputs().depth_key(unused))
@@ -379,7 +379,7 @@ fn what_a_shader_is_bound_to_may_change_within_a_set() {
     assert!(apart != whole);
 }
 
-/// What is heard of pipelines whose stages break a statement each, with its id.
+/// The ids of statements about stages, each with the message that breaking it gives.
 pub fn broken() -> Vec<(&'static str, String)> {
     let stage = Stage::new();
     let gpu = &stage.canvas.gpu;
@@ -419,7 +419,7 @@ pub fn broken() -> Vec<(&'static str, String)> {
     };
     let read = "VUID-VkGaussianResolveInputLocationsGAURAST-None-90023";
     let requests = [
-        // Nothing is there, or too little, or the same.
+        // The location is missing, too small, or used twice.
         (read, resolved(&stage.toned, [3, 5])),
         (read, resolved(&stage.toned, [5, 2])),
         (read, resolved(&stage.woven, [0, 0])),
@@ -431,7 +431,7 @@ pub fn broken() -> Vec<(&'static str, String)> {
             "VUID-VkGaussianResolveInputLocationsGAURAST-depth-90031",
             half(resolved(&stage.toned, [0, 1])),
         ),
-        // Not written, too narrow, and named twice.
+        // Not written, too narrow, and used twice.
         (location, with(outputs().covariance(9))),
         (location, with(outputs().color(3))),
         (location, with(outputs().opacity(unused))),
@@ -453,7 +453,7 @@ pub fn broken() -> Vec<(&'static str, String)> {
     heard.into()
 }
 
-/// Tones of premultiplied colours.
+/// The tone mapping of premultiplied colours.
 fn toned([r, g, b, a]: [f32; 4]) -> [f32; 4] {
     let [r, g, b] = [r, g, b].map(|c| c / (1.0 + c));
     [r, g, b, a]
@@ -499,7 +499,7 @@ fn a_resolve_shader_discards_and_differs_from_pixel_to_pixel() {
             assert_eq!(pixel, [0.0; 4]);
             continue;
         }
-        // The other pixel of the quad's row holds what it accumulated, covered or not.
+        // The other pixel of the quad's row has its accumulated value, covered or not.
         let slope = alpha(x | 1, y) - alpha(x & !1, y);
         assert_eq!(pixel, [2.0, 3.0, 5.0 * slope, alpha(x, y)]);
         covered += 1;

@@ -1,4 +1,4 @@
-//! Copies, blits and resolves between images: samples, aspects, layers and slices, and what is refused.
+//! Copies, blits and resolves between images: samples, aspects, layers and slices, and invalid uses that are refused.
 
 use crate::devices::{COLOR, COLOR_LAYERS, image, open};
 use ash::vk;
@@ -8,7 +8,7 @@ const GENERAL: vk::ImageLayout = vk::ImageLayout::GENERAL;
 const FORMAT: vk::Format = vk::Format::R8G8B8A8_UNORM;
 const X4: vk::SampleCountFlags = vk::SampleCountFlags::TYPE_4;
 
-/// A 2D image that is only copied.
+/// Options of a 2D image that is only copied.
 fn shape(format: vk::Format, width: u32, height: u32) -> ImageOptions {
     ImageOptions::new(format, [width, height], vk::ImageUsageFlags::empty())
 }
@@ -21,7 +21,7 @@ fn sampled_four_times(width: u32, height: u32) -> ImageOptions {
     }
 }
 
-/// How a square 2D image of four samples is created.
+/// The create info of a square 2D image of four samples.
 fn create_info(size: u32) -> vk::ImageCreateInfo<'static> {
     vk::ImageCreateInfo::default()
         .image_type(vk::ImageType::TYPE_2D)

@@ -1,4 +1,4 @@
-//! Images, samplers and texel buffers as kernels are bound to them.
+//! Images, samplers and texel buffers in kernels.
 
 use crate::devices::{COLOR_LAYERS, image, open};
 use crate::scene::extent;
@@ -68,7 +68,7 @@ fn kernels_read_and_write_images() {
         };
         let numbers_view = [view(numbers.raw, vk::Format::R8_UINT)];
         let counts_view = [view(counts.raw, vk::Format::R32_UINT)];
-        // Green as red and red as green.
+        // A view that swaps red and green.
         let swapped = vk::ImageViewCreateInfo::default()
             .image(source.raw)
             .view_type(vk::ImageViewType::TYPE_2D)
@@ -115,7 +115,8 @@ fn kernels_read_and_write_images() {
     let stored = target.colors::<[u8; 4]>();
     for (i, found) in stored.iter().enumerate() {
         let (x, y) = (i % 8, i / 8);
-        // The centre's cell of the 7x7 between texels: the mean of red is that of its corners.
+        // The centre is in one cell of the 7x7 cells between texels. The mean of red there is that of the cell's
+        // corners.
         let cell = |at: usize| (at as f64 + 0.5) * 7.0 / 8.0;
         let (u, v) = (cell(x).floor(), cell(y).floor());
         let red = 16.0 * u + 8.0 + 2.0 * v + 1.0;

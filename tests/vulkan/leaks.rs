@@ -1,4 +1,4 @@
-//! Destroying everything leaves nothing. Alone in its process, because it counts the process's handles.
+//! Destroying everything leaves no object. The test has a process of its own, because it counts the process's handles.
 
 use crate::context::{Context, everything};
 use ash::vk;

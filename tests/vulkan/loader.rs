@@ -1,4 +1,4 @@
-//! The driver through the Vulkan loader, as programs that know nothing of it would use it.
+//! The driver through the Vulkan loader, as ordinary programs use it.
 
 use crate::context::{Context, loader};
 use ash::vk;
@@ -26,7 +26,7 @@ fn a_device_is_created_and_destroyed(case: &Case) {
                 &mut vk::PhysicalDeviceFeatures2::default(),
             )
             .unwrap();
-        // The loader doesn't know this command: it comes straight from the driver.
+        // The loader does not know this command, so the pointer comes from the driver.
         let functions =
             gaurast::gaussian_primitive_topology::Device::new(&context.instance, &device);
         assert_eq!(functions.device(), device.handle());
@@ -38,11 +38,11 @@ fn a_device_is_created_and_destroyed(case: &Case) {
     });
 }
 
-/// The library is unloaded with the last instance, when no thread may be left in it.
+/// The library is unloaded with the last instance. No thread may still run in it then.
 #[gaurast_runner::test(needs = [Need::VulkanLoader])]
 fn the_library_is_loaded_and_unloaded_many_times(case: &Case) {
     through_the_loader(case, || {
-        // The loader itself stays.
+        // The loader itself remains loaded.
         let entry = loader();
         for _ in 0..20 {
             let context = Context::new(entry.clone(), &[]);
@@ -84,7 +84,7 @@ fn layers() -> Vec<Variant> {
     vec![Variant::new("no layer"), validated]
 }
 
-/// `vulkaninfo` asks for everything that a physical device can be asked for.
+/// `vulkaninfo` makes every query of a physical device.
 #[gaurast_runner::test(needs = [Need::Program("vulkaninfo"), Need::VulkanLoader], each = layers())]
 fn vulkaninfo_lists_the_device(case: &Case) {
     let directory = tempfile::tempdir().expect("a temporary directory");
@@ -111,7 +111,7 @@ fn vulkaninfo_lists_the_device(case: &Case) {
     );
 }
 
-/// The shared library exports what the loader needs and no Vulkan command.
+/// The shared library exports the loader's symbols and no Vulkan command.
 #[gaurast_runner::test(needs = [Need::Program("nm")])]
 fn only_the_loaders_symbols_are_exported() {
     let output = Command::new("nm")

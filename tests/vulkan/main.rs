@@ -1,7 +1,7 @@
-//! The driver as an application sees it: `ash` over the embedded door and through the loader.
+//! Tests of the driver through `ash`, embedded and through the loader.
 //!
-//! `unsafe` here has one reason throughout: these are Vulkan calls, and each test follows Vulkan's valid usage or
-//! breaks it in the one way that it is about, which the driver must survive.
+//! The reason for all `unsafe` here is the same: these are Vulkan calls. Each test follows Vulkan's valid usage, or
+//! violates one rule on purpose, which the driver must survive.
 
 mod canvas;
 mod command_buffers;

@@ -1,4 +1,4 @@
-//! Device memory, and what is bound to it.
+//! Device memory, and the resources bound to it.
 
 use crate::devices::{DEVICE_ONLY, MAPPABLE, allocate, open};
 use ash::vk;
@@ -31,7 +31,7 @@ fn mapped_memory_keeps_what_is_written() {
             device.map_memory(memory, 0, 10, NO_FLAGS).is_err(),
             "mapped"
         );
-        // Freeing memory unmaps it.
+        // Freeing memory also unmaps it.
         device.free_memory(memory, None);
     }
 }
@@ -195,7 +195,7 @@ fn requirements_are_the_same_however_they_are_asked_for() {
     assert_eq!(dedicated_is_not_asked_for(), (vk::FALSE, vk::FALSE));
 }
 
-/// What a structure chained to the requirements of a buffer says.
+/// The values of `VkMemoryDedicatedRequirements` for a buffer.
 fn dedicated_is_not_asked_for() -> (vk::Bool32, vk::Bool32) {
     let gpu = open();
     let buffer = Buffer::new(&gpu, 64);

@@ -1,4 +1,4 @@
-//! What becomes of fragments: attachments, blending, depth and samples.
+//! The processing of fragments: attachments, blending, depth and samples.
 
 use crate::canvas::{
     BLUE, CLEAR, Canvas, DEPTH_FORMAT, GREEN, PIXELS, RED, colored, count, deep_vertex, everything,
@@ -161,7 +161,7 @@ fn demoted_invocations_write_nothing_and_help() {
     assert_eq!(at(&pixels, (7, 5)), CLEAR);
 }
 
-/// Draws everything on four samples and resolves them.
+/// Draws a triangle that covers everything on four samples, and resolves them.
 fn resolved(canvas: &Canvas, request: &Graphics<'_>, color: [f32; 4]) -> [f32; 4] {
     let gpu = &canvas.gpu;
     let samples = sampled_image(gpu, vk::SampleCountFlags::TYPE_4);
@@ -210,7 +210,7 @@ fn samples_are_shaded_masked_and_covered() {
         resolved(&canvas, &masked, RED),
         [5.0 / 4.0 + clear, clear, clear, 0.5],
     );
-    // Alpha of one half covers two samples, and becomes one there.
+    // An alpha of one half covers two samples, and is replaced by one there.
     let covering = Graphics {
         multisample: four
             .alpha_to_coverage_enable(true)

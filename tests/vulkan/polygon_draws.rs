@@ -1,4 +1,4 @@
-//! Points, lines and triangles as they are drawn.
+//! Draws of points, lines and triangles.
 
 use crate::canvas::{
     BLUE, CLEAR, Canvas, DEPTH_FORMAT, GREEN, PIXELS, RED, Vertex, colored, count, deep_vertex,
@@ -20,7 +20,7 @@ fn a_triangle_covers_what_it_covers() {
     let pixels = canvas.draw_vertices(&colored(), &vertices);
     assert_eq!(at(&pixels, (0, 0)), RED);
     assert_eq!(at(&pixels, (WIDTH - 1, HEIGHT - 1)), CLEAR);
-    // The diagonal passes through no pixel's centre but where the sides' ratio has it.
+    // The diagonal passes only through the pixel centres at which the ratio of the sides is exact.
     for y in 0..HEIGHT {
         for x in 0..WIDTH {
             let along = (x as f32 + 0.5) / WIDTH as f32 + (y as f32 + 0.5) / HEIGHT as f32;
@@ -74,7 +74,7 @@ fn indices_choose_vertices() {
     }
 }
 
-/// A pipeline that draws quads in cells, an instance each, over `numbered.vert`.
+/// A pipeline that draws a quad per instance, each in a cell, with `numbered.vert`.
 fn cells(divisor: Option<u32>) -> Graphics<'static> {
     Graphics {
         shaders: vec![
@@ -122,7 +122,7 @@ fn instances_are_numbered_and_have_attributes() {
     assert_eq!(cell(&pixels, 1, 0), [1.0, 1.0, 0.0, 1.0]);
     assert_eq!(cell(&pixels, 2, 1), [2.0, 1.0, 0.0, 1.0]);
     assert_eq!(cell(&pixels, 3, 3), [3.0, 1.0, 0.0, 1.0]);
-    // Every second instance; the first one's index doesn't count.
+    // The attribute advances every second instance; the first instance's index does not change that.
     let pixels = canvas.draw_of(&cells(Some(2)), places.as_flattened(), draw);
     assert_eq!(cell(&pixels, 1, 0), [2.0, 1.0, 0.0, 1.0]);
     assert_eq!(cell(&pixels, 2, 1), [3.0, 1.0, 0.0, 1.0]);
@@ -196,8 +196,8 @@ fn the_provoking_vertex_is_chosen() {
     );
 }
 
-/// The vertices that give a topology's primitives their flat values, as "Primitive Topologies" of the specification says: a
-/// vertex for each primitive, in the first and in the last convention.
+/// The provoking vertices of each topology's primitives, as in "Primitive Topologies" of the specification: one vertex
+/// for each primitive, with the first-vertex and the last-vertex convention.
 const PROVOKING: [(vk::PrimitiveTopology, &[usize], &[usize]); 6] = [
     (
         vk::PrimitiveTopology::POINT_LIST,
@@ -223,7 +223,7 @@ const PROVOKING: [(vk::PrimitiveTopology, &[usize], &[usize]); 6] = [
     ),
 ];
 
-/// The corners of a hexagon, which make primitives of every topology that show.
+/// The corners of a hexagon, which make visible primitives in every topology.
 fn hexagon() -> [Vertex; 6] {
     std::array::from_fn(|number| {
         let (sine, cosine) = (number as f32 * std::f32::consts::FRAC_PI_3).sin_cos();
@@ -244,7 +244,7 @@ fn each_primitive_has_its_provoking_vertex() {
                 ..colored()
             }
             .with_shader(Shader::fragment(spirv!("flat.frag")));
-            // Later primitives hide earlier ones, so that each is looked at before the next is drawn.
+            // Later primitives hide earlier ones, so each one is read before the next is drawn.
             let seen: Vec<usize> = (0..expected.len())
                 .map(|primitive| {
                     let pixels = canvas.draw(&request, &vertices, |device, commands, _| {
@@ -269,7 +269,7 @@ fn each_primitive_has_its_provoking_vertex() {
     }
 }
 
-/// The vertices up to the end of a primitive.
+/// The number of vertices up to the end of a primitive.
 fn vertices_to(topology: vk::PrimitiveTopology, primitive: usize) -> u32 {
     let count = match topology {
         vk::PrimitiveTopology::POINT_LIST => primitive + 1,
@@ -288,7 +288,7 @@ fn points_have_the_size_that_the_shader_says() {
         topology: vk::PrimitiveTopology::POINT_LIST,
         ..colored()
     };
-    // The corner of four pixels in the middle.
+    // The common corner of the four pixels in the middle.
     let pixels = canvas.draw_vertices(&request, &[vertex(0.0, 0.0, RED)]);
     assert_eq!(count(&pixels, RED), 16);
     assert_eq!(at(&pixels, (WIDTH / 2 - 2, HEIGHT / 2 - 2)), RED);
@@ -414,7 +414,7 @@ fn shaders_clip_and_cull() {
     assert_eq!(count(&pixels, RED), PIXELS / 2);
     assert_eq!(at(&pixels, (WIDTH / 2 - 1, 9)), CLEAR);
     assert_eq!(at(&pixels, (WIDTH / 2, 9)), RED);
-    // One vertex inside keeps the primitive.
+    // One vertex inside is enough to keep the primitive.
     let mut vertices = everything(BLUE);
     assert_eq!(
         count(&canvas.draw_vertices(&request, &vertices), CLEAR),

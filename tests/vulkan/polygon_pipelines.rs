@@ -1,4 +1,4 @@
-//! Which pipelines of points, lines and triangles there are, and what is said of others.
+//! Valid pipelines of points, lines and triangles, and the messages about invalid ones.
 
 use crate::canvas::colored;
 use crate::devices::open;

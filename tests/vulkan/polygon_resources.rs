@@ -1,4 +1,4 @@
-//! What draws of points, lines and triangles reach, and what queries count of them.
+//! Resources that draws of points, lines and triangles use, and queries of them.
 
 use crate::canvas::{BLUE, CLEAR, Canvas, GREEN, PIXELS, RED, colored, count, everything, vertex};
 use crate::devices::image;
@@ -127,7 +127,7 @@ fn queries_count_samples_and_invocations() {
         device.reset_query_pool(counted, 0, 1);
     }
     let mut vertices = everything(RED).to_vec();
-    // Behind the eye.
+    // The triangle is behind the eye.
     vertices.extend(everything(GREEN).map(|[x, y, z, _, r, g, b, a]| [x, y, z, -1.0, r, g, b, a]));
     canvas.draw(&colored(), &vertices, |device, commands, _| {
         // SAFETY: see the crate.

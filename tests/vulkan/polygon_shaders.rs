@@ -1,4 +1,4 @@
-//! What the shaders of points, lines and triangles may do.
+//! Features of shaders of points, lines and triangles.
 
 use crate::canvas::{
     CLEAR, Canvas, DEPTH_FORMAT, GREEN, PIXELS, RED, colored, count, deep_vertex, everything,
@@ -35,7 +35,7 @@ fn fragments_read_clip_and_cull_distances() {
             }
         }
     }
-    // What the vertex shader doesn't write is zero.
+    // Inputs of the fragment shader that the vertex shader does not write are zero.
     request.shaders[0] = colored().shaders[0].clone();
     let pixels = canvas.draw_vertices(&request, &vertices);
     assert_eq!(count(&pixels, [0.0, 0.0, 0.0, 1.0]), PIXELS);
@@ -83,7 +83,7 @@ fn a_depth_that_breaks_its_promise_is_written() {
     .unwrap();
     let at_depth =
         |depth, color| everything(color).map(|[x, y, ..]| deep_vertex([x, y, depth], color));
-    // The second draw lies between the depth of the first one's triangle and what its shader wrote.
+    // The second draw is between the depth of the first triangle and the depth that its shader wrote.
     let vertices = [at_depth(0.6, RED), at_depth(0.65, GREEN)].concat();
     let pixels = canvas.draw(&request, &vertices, |device, commands, _| {
         // SAFETY: see the crate.

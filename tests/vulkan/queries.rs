@@ -77,7 +77,7 @@ fn occlusion_queries_count_the_fragments_of_gaussian_draws() {
         blend: vec![crate::scene::replace().color_write_mask(vk::ColorComponentFlags::empty())],
         ..splats()
     };
-    // What is written nowhere counts all the same.
+    // Fragments that write nothing are counted too.
     let [shown, hidden] = [splats(), masked].map(|request| {
         let scene = Scene::new(&gaussians, &request);
         let device = scene.gpu.device();

@@ -208,7 +208,7 @@ fn passes_load_what_is_there_within_their_area() {
         begin(device, commands, load, area(&image), none);
         clear_attachment(device, commands, [0.0, 1.0, 0.0, 1.0], corner());
         end();
-        // Only the area is cleared; resuming does not clear again.
+        // Only the area is cleared; resuming the pass does not clear again.
         let left = vk::Rect2D {
             extent: vk::Extent2D {
                 width: 2,

@@ -32,7 +32,7 @@ pub fn splat(position: [f32; 3], scale: f32, opacity: f32, color: [f32; 3]) -> S
     ]
 }
 
-/// A pipeline for [`Splat`]s over one colour attachment, to be changed before it is created.
+/// The options of a pipeline for [`Splat`]s over one colour attachment, which may be changed before it is created.
 pub fn splats() -> Graphics<'static> {
     let attribute =
         |location: u32, format: vk::Format, floats: u32| vk::VertexInputAttributeDescription {
@@ -64,7 +64,7 @@ pub fn splats() -> Graphics<'static> {
     }
 }
 
-/// Looks along +z from the origin, with the principal point on the centre of pixel [`CENTER`].
+/// A camera at the origin that looks along +z, with the principal point at the centre of pixel [`CENTER`].
 pub fn camera() -> GaussianCameraGAURAST<'static> {
     GaussianCameraGAURAST::default()
         .focal_length([100.0, 100.0])
@@ -102,7 +102,7 @@ pub fn set_viewport(device: &ash::Device, commands: vk::CommandBuffer, image: &I
     }
 }
 
-/// Records a pass that clears `image`, with viewport and scissor set, and what `record` records in it.
+/// Records a pass that clears `image` and sets viewport and scissor, with the commands of `record`.
 pub fn pass(
     device: &ash::Device,
     commands: vk::CommandBuffer,
@@ -117,7 +117,7 @@ pub fn pass(
     });
 }
 
-/// Records a pass that clears `image`, and what `record` records in it.
+/// Records a pass that clears `image`, with the commands of `record`.
 pub fn pass_with(
     flags: vk::RenderingFlags,
     device: &ash::Device,
@@ -146,7 +146,7 @@ pub fn pass_with(
     unsafe { device.cmd_end_rendering(commands) };
 }
 
-/// Gaussians, a pipeline that draws them and an image that they are drawn to.
+/// Gaussians, a pipeline that draws them, and an image for the picture.
 pub struct Scene {
     pub gpu: Gpu,
     pub pipeline: Pipeline,
@@ -169,7 +169,7 @@ impl Scene {
         }
     }
 
-    /// Draws in a pass of its own that clears to `clear`; `draw` records the draw.
+    /// Draws in a pass that clears to `clear`; `record` records the draw.
     pub fn draw(
         &self,
         clear: [f32; 4],
@@ -185,7 +185,7 @@ impl Scene {
         self.pixels()
     }
 
-    /// The image.
+    /// The pixels of the image.
     pub fn pixels(&self) -> Vec<[f32; 4]> {
         self.image.colors()
     }
@@ -207,7 +207,7 @@ pub fn at(pixels: &[[f32; 4]], (x, y): (u32, u32)) -> [f32; 4] {
     pixels[(y * WIDTH + x) as usize]
 }
 
-/// Premultiplied colour with alpha.
+/// The premultiplied colour with its alpha.
 pub fn premultiplied(color: [f32; 3], alpha: f32) -> [f32; 4] {
     let [r, g, b] = color.map(|c| c * alpha);
     [r, g, b, alpha]

@@ -1,4 +1,4 @@
-//! Render passes whose subpasses read what others left, and resolve samples.
+//! Render passes whose subpasses read the results of others and resolve samples.
 
 use crate::canvas::{Canvas, Vertex, colored, deep_vertex, everything};
 use crate::devices::{COLOR_LAYERS, open};
@@ -63,7 +63,7 @@ fn render_pass(
     unsafe { gpu.device().create_render_pass(&info, None).unwrap() }
 }
 
-/// What the second subpass reads, the first has written.
+/// The dependency of the second subpass's reads on the first one's writes.
 fn dependency() -> vk::SubpassDependency {
     vk::SubpassDependency::default()
         .src_subpass(0)
@@ -121,7 +121,7 @@ impl TwoDraws<'_> {
                         stencil: 0,
                     },
                 };
-                // Of colours it doesn't matter, as long as it is black.
+                // The colours' clear values do not matter as long as they are black.
                 let values = [vk::ClearValue::default(), depth, depth];
                 let begin = vk::RenderPassBeginInfo::default()
                     .render_pass(self.pass)
@@ -146,7 +146,7 @@ impl TwoDraws<'_> {
     }
 }
 
-/// Half of the canvas, in one colour and at one depth.
+/// A triangle that covers half of the canvas, in one colour and at one depth.
 fn half(color: [f32; 4]) -> [Vertex; 3] {
     let corner = |x, y| deep_vertex([x, y, 0.25], color);
     [corner(-1.0, -1.0), corner(1.0, -1.0), corner(-1.0, 1.0)]
@@ -277,7 +277,7 @@ fn samples_are_resolved_and_read_one_by_one() {
             "{mean:?}"
         );
         counts[covered as usize] += 1;
-        // Samples are all or nothing, and where all four agree, so do two.
+        // The difference of two samples is 0 or 1, and it is 0 if all four samples agree.
         assert!(
             [0.0, 1.0].contains(&read[0]) && read[1] == 0.25 * read[0],
             "{read:?}"

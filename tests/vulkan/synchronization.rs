@@ -32,7 +32,7 @@ fn fences_tell_when_a_submission_is_done() {
         assert!(buffer.values::<u32>().iter().all(|&word| word == 3));
         device.reset_fences(&[fence]).unwrap();
         assert!(!device.get_fence_status(fence).unwrap());
-        // A submission of nothing signals its fence too.
+        // An empty submission signals its fence too.
         device.queue_submit(gpu.queue(), &[], fence).unwrap();
         device.wait_for_fences(&[fence], true, u64::MAX).unwrap();
         device.destroy_fence(fence, None);

@@ -21,7 +21,7 @@ fn buffers_are_filled_updated_and_copied() {
         // SAFETY: see the crate.
         unsafe {
             device.cmd_fill_buffer(commands, source.raw, 0, vk::WHOLE_SIZE, 0x0101_0101);
-            // The data is the command's own: it is copied while recording.
+            // The command copies the data when it is recorded.
             let mut data = [5u8, 6, 7, 8];
             device.cmd_update_buffer(commands, source.raw, 4, &data);
             data.fill(0);

@@ -1,4 +1,4 @@
-//! The extension's valid usage: each statement of the specification is broken once, and its id is heard.
+//! The extension's valid usage: each statement of the specification is violated once, and the message must have its id.
 
 use crate::devices::{gaussian, open, without_modes};
 use crate::scene::{Scene, camera, splat, splats};
@@ -16,7 +16,7 @@ use std::collections::BTreeSet;
 const SPECIFICATION: &str =
     include_str!("../../api/spec/VK_GAURAST_gaussian_primitive_topology.adoc");
 
-/// The ids of the specification's statements.
+/// The ids of the statements in the specification.
 fn stated() -> BTreeSet<&'static str> {
     let is_of_id = |c: char| c.is_ascii_alphanumeric() || c == '-';
     let candidates = SPECIFICATION.split(|c: char| !is_of_id(c));
@@ -43,7 +43,7 @@ fn allowing(exponential_error: f32, contribution_budget: f32) -> Graphics<'stati
     }
 }
 
-/// Pipelines that break one statement each.
+/// Pipelines that violate one statement each.
 fn pipelines() -> Vec<(&'static str, Graphics<'static>)> {
     let missing = |index: usize| {
         let mut request = splats();
@@ -141,7 +141,7 @@ fn pipelines() -> Vec<(&'static str, Graphics<'static>)> {
     ]
 }
 
-/// Pipelines that use a mode each, on a device on which none is enabled.
+/// Pipelines that use one mode each, on a device on which no mode is enabled.
 fn modes() -> Vec<(&'static str, Graphics<'static>)> {
     let buffer = GaussianCameraSourceGAURAST::UNIFORM_BUFFER;
     let compensated = GaussianAntialiasingGAURAST::OPACITY_COMPENSATED;
@@ -223,7 +223,7 @@ fn modes() -> Vec<(&'static str, Graphics<'static>)> {
     ]
 }
 
-/// Cameras that break one statement each.
+/// Cameras that violate one statement each.
 fn cameras() -> Vec<(&'static str, GaussianCameraGAURAST<'static>)> {
     let nan = f32::NAN;
     vec![
@@ -262,7 +262,7 @@ fn cameras() -> Vec<(&'static str, GaussianCameraGAURAST<'static>)> {
     ]
 }
 
-/// Creates the pipeline, which must fail, and gives what was heard.
+/// Creates the pipeline, which must fail, and returns the messages.
 fn refused(gpu: &Gpu, request: &Graphics<'_>, result: vk::Result, what: &str) -> String {
     let error = request.create(gpu).expect_err(what);
     assert_eq!(error, result, "{what}");
@@ -327,7 +327,7 @@ fn every_statement_is_reported_by_its_id() {
     assert!(untested.is_empty(), "no test breaks {untested:?}");
 }
 
-/// What is heard when 2D Gaussians are drawn through a fisheye, which draws nothing.
+/// The messages of a draw of 2D Gaussians through a fisheye, which draws nothing.
 fn flat_through_a_fisheye() -> String {
     let scene = Scene::new(
         &[splat([0.0, 0.0, 5.0], 0.1, 0.8, [0.5; 3])],
@@ -345,7 +345,7 @@ fn flat_through_a_fisheye() -> String {
     scene.gpu.message_texts().concat()
 }
 
-/// What is heard when a pipeline has a stage.
+/// The messages about a pipeline with a stage.
 fn with_a_stage(gpu: &Gpu, stage: vk::ShaderStageFlags, result: vk::Result) -> String {
     let code = vec![0x0723_0203, 0x0001_0000, 0, 1, 0];
     let request = Graphics {

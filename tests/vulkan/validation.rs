@@ -10,7 +10,7 @@ use std::ffi::CStr;
 
 const LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 
-/// The messages of the layer, which does not know the extension, about a right use of it.
+/// The layer's messages about valid usage of the extension, which it does not know.
 const EXPECTED: &[&str] = &[
     // The device extension is unknown.
     "VUID_Undefined",
@@ -23,7 +23,7 @@ const EXPECTED: &[&str] = &[
     "VUID-VkGraphicsPipelineCreateInfo-stageCount-06604",
 ];
 
-/// The layer's advice on speed: the testkit keeps every image in one layout.
+/// Advice of the layer on speed, which is ignored: the testkit keeps every image in one layout.
 const ADVICE: &str = "For optimal performance";
 
 #[gaurast_runner::test(needs = [Need::ValidationLayer])]

@@ -1,4 +1,5 @@
-//! The valid usage of cameras by view, sets, dynamic states and what else viewers need: each statement is broken once.
+//! The valid usage of cameras by view, sets, dynamic states and other features for viewers: each statement is violated
+//! once.
 
 use crate::devices::{gaussian, open, without_modes};
 use crate::scene::{Scene, camera, splat, splats};
@@ -14,7 +15,7 @@ use gaurast::vk::{
 };
 use gaurast_testkit::{Gpu, Graphics};
 
-/// What is heard when a recording fails.
+/// The messages when ending a recording fails.
 fn unrecorded(gpu: &Gpu, record: impl FnOnce(&ash::Device, vk::CommandBuffer)) -> String {
     let recorded = gpu.try_record(|recording| {
         let (device, commands) = recording.raw();
@@ -25,14 +26,14 @@ fn unrecorded(gpu: &Gpu, record: impl FnOnce(&ash::Device, vk::CommandBuffer)) -
     gpu.message_texts().concat()
 }
 
-/// What is heard when a pipeline is refused.
+/// The messages when a pipeline is refused.
 fn refused(gpu: &Gpu, request: &Graphics) -> String {
     let error = request.create(gpu).expect_err("it is refused");
     assert_eq!(error, vk::Result::ERROR_VALIDATION_FAILED_EXT);
     gpu.message_texts().concat()
 }
 
-/// What is heard of a draw that draws nothing.
+/// The messages of a draw that draws nothing.
 fn draws_nothing(
     request: &Graphics,
     record: impl FnOnce(&Scene, &ash::Device, vk::CommandBuffer),
@@ -45,7 +46,7 @@ fn draws_nothing(
     scene.gpu.message_texts().concat()
 }
 
-/// The ids of statements, each with what is heard when it is broken.
+/// The ids of statements, each with the messages when it is violated.
 pub fn broken() -> Vec<(&'static str, String)> {
     let mut broken = cameras_by_view();
     broken.extend(sets());
@@ -235,7 +236,7 @@ fn sets() -> Vec<(&'static str, String)> {
         unsafe { extension.cmd_begin_gaussian_set(commands) };
     });
     let other_draw = |change: &dyn Fn(&Scene, &ash::Device, vk::CommandBuffer)| {
-        // Nothing comes of the first one either, which is behind the camera.
+        // The first draw draws nothing either, because it is behind the camera.
         let behind = [splat([0.0, 0.0, -5.0], 0.1, 0.8, [0.5; 3]); 2];
         let scene = Scene::new(&behind, &splats());
         scene.draw([0.25; 4], |device, commands| {
@@ -262,7 +263,7 @@ fn sets() -> Vec<(&'static str, String)> {
     let other_pipeline = other_draw(&|scene, device, commands| {
         let point = vk::PipelineBindPoint::GRAPHICS;
         let other = splats().create(&scene.gpu).unwrap();
-        // SAFETY: see the crate. What was recorded keeps the pipeline.
+        // SAFETY: see the crate. The recorded commands keep the pipeline alive.
         unsafe { device.cmd_bind_pipeline(commands, point, other.raw) };
     });
     vec![
@@ -338,7 +339,7 @@ fn cameras_by_view() -> Vec<(&'static str, String)> {
     broken
 }
 
-/// Every property meets the limit that the specification requires.
+/// Every property is within the limits that the specification requires.
 #[gaurast_runner::test]
 fn properties_meet_their_limits() {
     let gpu = open();

@@ -1,5 +1,5 @@
-//! The watchdog: a kernel that never ends loses its device, and nothing else. The time limit comes from the environment,
-//! so that the test has a process of its own.
+//! The watchdog: a kernel with an infinite loop loses its device, and no other one. The time limit comes from the
+//! environment, so the test has a process of its own.
 
 use crate::devices::open;
 use crate::spirv;
@@ -21,7 +21,7 @@ fn a_kernel_without_end_loses_its_device_alone(case: &Case) {
     let survivor = open();
     let fence = lose(&doomed);
 
-    // The device stays lost, and says so.
+    // The device stays lost, and calls report that.
     // SAFETY: see the crate.
     unsafe {
         let lost = Err(vk::Result::ERROR_DEVICE_LOST);
@@ -38,11 +38,11 @@ fn a_kernel_without_end_loses_its_device_alone(case: &Case) {
     assert!(messages.iter().any(stopped), "{messages:?}");
     drop(doomed);
 
-    // Another device, and one that is made afterwards, work.
+    // Another device, and one that is created afterwards, work.
     shared_sums(&survivor);
     shared_sums(&open());
 
-    // Many honest workgroups together may take longer than one may.
+    // Many workgroups together may take longer than the limit of one.
     let words = spirv!("shared.comp");
     let kernel = Compute::new(&survivor, &words, &[BINDINGS]);
     let data = Buffer::of(&survivor, &[0u32; 256 * 64]);
@@ -60,7 +60,7 @@ fn a_kernel_without_end_loses_its_device_alone(case: &Case) {
     }
 }
 
-/// Submits a kernel that never ends, and waits until its fence tells of the lost device.
+/// Submits a kernel with an infinite loop, and waits until its fence reports the lost device.
 fn lose(gpu: &Gpu) -> vk::Fence {
     let kernel = Compute::new(gpu, &spirv!("endless.comp"), &[BINDINGS]);
     let data = Buffer::of(gpu, &[0u32; 2]);
@@ -93,7 +93,7 @@ fn lose(gpu: &Gpu) -> vk::Fence {
     fence
 }
 
-/// Runs a kernel and checks what it does.
+/// Runs a kernel and checks its result.
 fn shared_sums(gpu: &Gpu) {
     let kernel = Compute::new(gpu, &spirv!("shared.comp"), &[BINDINGS]);
     let data = Buffer::of(gpu, &[1u32; 256]);

@@ -1,4 +1,4 @@
-//! Vulkan for one small picture at a time. Objects go with the process.
+//! Vulkan code that draws one small picture at a time. The end of the process frees the objects.
 
 use std::error::Error;
 
@@ -9,62 +9,62 @@ use image::{Rgb, RgbImage};
 
 const COLOR: vk::Format = vk::Format::R8G8B8A8_UNORM;
 const DEPTH: vk::Format = vk::Format::D32_SFLOAT;
-/// The degree of the spherical harmonics: colours alone.
+/// The first location of the model matrix, which has three rows.
 const MODEL_MATRIX: u32 = 5;
 const MODEL_OPACITY: u32 = 8;
 
-/// Bytes of the vertex shader's constants: the picture's size and the focal lengths.
+/// The size in bytes of the vertex shader's constants: the picture's size and the focal lengths.
 const CONSTANTS: u32 = 16;
 
 type Outcome<T> = Result<T, Box<dyn Error>>;
 
-/// Position, scale, rotation (w x y z), opacity, and the constant spherical harmonic's colour.
+/// A Gaussian: position, scale, rotation (w x y z), opacity, and the coefficient of the constant spherical harmonic.
 pub type Splat = [f32; 14];
 
-/// The rows of a model matrix and a factor of the opacity.
+/// The rows of a model matrix, and an opacity factor.
 pub type Instance = [f32; 13];
 
-/// A triangle of one depth: a corner's place, from -1 to 1, and colour each.
+/// A triangle of one depth: the position, from -1 to 1, and the colour of each corner.
 pub struct Triangle {
     pub corners: [[f32; 5]; 3],
     pub depth: f32,
 }
 
-/// What a picture shows, and how.
+/// The contents of a picture and the mode of drawing.
 pub struct Picture<'a> {
     pub size: [u32; 2],
     pub camera: GaussianCameraGAURAST<'static>,
     pub state: PipelineGaussianStateCreateInfoGAURAST<'static>,
     pub splats: &'a [Splat],
-    /// What places the Gaussians, once each.
+    /// The placements of the Gaussians; all are drawn once for each.
     pub instances: &'a [Instance],
-    /// Drawn before the Gaussians, which are tested against its depth.
+    /// A triangle that is drawn before the Gaussians, which are tested against its depth.
     pub triangle: Option<Triangle>,
     pub samples: vk::SampleCountFlags,
-    /// How many Gaussians each draw has, if not all are drawn at once.
+    /// The number of Gaussians of each draw; empty if one draw has all.
     pub draws: &'a [u32],
-    /// They share a sorted set.
+    /// True if the draws are one sorted set.
     pub share_a_set: bool,
-    /// A vertex shader projects.
+    /// True if a vertex shader projects the Gaussians.
     pub by_shader: bool,
-    /// What makes colours of what accumulates, if not the device alone.
+    /// The resolve shader, if there is one.
     pub resolve: Option<Resolve>,
-    /// Alpha becomes coverage.
+    /// True if alpha becomes coverage.
     pub coverage: bool,
 }
 
 /// A resolve shader.
 #[derive(Clone, Copy)]
 pub enum Resolve {
-    /// Tones with an edge.
+    /// Tone mapping with an edge.
     Tones = 0,
-    /// Colours of the expected depth.
+    /// Colours for the expected depth.
     Expected = 1,
-    /// Colours of the median depth.
+    /// Colours for the median depth.
     Median = 2,
 }
 
-/// A device with the extension, and everything that it draws Gaussians in.
+/// A device with the extension, and the objects that all pictures share.
 pub struct Gpu {
     device: ash::Device,
     extension: gaussian_primitive_topology::Device,
@@ -81,8 +81,8 @@ struct Image {
     pixels: *const u8,
 }
 
-// SAFETY throughout: handles are used while they live, structures are valid, commands are in order, and the host touches
-// memory only while the device is idle.
+// SAFETY of all `unsafe` here: handles are used while they are valid, structures are valid, commands are in order, and
+// the host touches memory only while the device is idle.
 impl Gpu {
     pub fn new() -> Outcome<Self> {
         let entry = vulkan_gaurast::entry();
@@ -210,7 +210,7 @@ impl Gpu {
             Ok(())
         })?;
         let plane = vk::ImageSubresource::default().aspect_mask(vk::ImageAspectFlags::COLOR);
-        // SAFETY: see above; a linear image's rows lie in its memory as its layout says.
+        // SAFETY: see above; the rows of a linear image are in its memory as its layout says.
         unsafe {
             let layout = (self.device).get_image_subresource_layout(target.raw, plane);
             let [width, height] = picture.size;
@@ -221,7 +221,7 @@ impl Gpu {
         }
     }
 
-    /// Records commands behind transitions of images, and waits until they have run.
+    /// Records transitions of images and then commands, and waits until they have run.
     fn run(
         &self,
         images: &[(Image, vk::Format)],
@@ -279,7 +279,7 @@ impl Gpu {
         }
     }
 
-    /// A vertex buffer; an empty one has room for something.
+    /// A vertex buffer with `bytes`; it has a minimum size if they are empty.
     fn buffer(&self, bytes: &[u8]) -> Outcome<vk::Buffer> {
         let info = vk::BufferCreateInfo::default()
             .size(bytes.len().max(64) as u64)
@@ -295,7 +295,7 @@ impl Gpu {
         }
     }
 
-    /// An attachment of a picture's size; one of colour and one sample can be read.
+    /// An attachment of a picture's size. A colour attachment with one sample can be read.
     fn image(
         &self,
         picture: &Picture<'_>,

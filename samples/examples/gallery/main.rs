@@ -16,7 +16,7 @@ use image::RgbImage;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use rooms::{Content, Exhibit};
 
-/// How two pictures differ: grey where they do not, `times` as much as they do.
+/// The difference of two pictures, multiplied by `times`; grey where they are equal.
 fn difference(a: &RgbImage, b: &RgbImage, times: f32) -> RgbImage {
     let mut picture = a.clone();
     for (a, b) in picture.iter_mut().zip(b.iter()) {
@@ -40,7 +40,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     std::fs::create_dir_all(&pictures)?;
     let scenes = scenes::Scenes::new();
     let gpu = Gpu::new()?;
-    let mut page = "# Gallery\n\nA picture of each mode; `cargo run --release --example gallery` draws them again.\n".to_owned();
+    let mut page = "# Gallery\n\nA picture of each mode. `cargo run --release -p gaurast-examples --example gallery` draws them and writes this page.\n".to_owned();
     for room in rooms::all(&scenes) {
         let (mut images, mut captions) = (String::new(), String::new());
         for Exhibit {

@@ -1,4 +1,4 @@
-//! What is shown beside what.
+//! The contents of the gallery's page: rooms of pictures that are compared.
 
 use ash::vk::SampleCountFlags as Samples;
 use gaurast::vk::{
@@ -13,15 +13,15 @@ use crate::scenes::{self, Scenes};
 
 const SIZE: [u32; 2] = [192, 120];
 
-/// What a picture shows.
+/// The contents of a picture.
 #[allow(clippy::large_enum_variant, reason = "there are some thirty of them")]
 pub enum Content<'a> {
     Drawn(Picture<'a>),
-    /// How the second of two differs from the first, so many times as much.
+    /// The difference of the second picture from the first, multiplied by the number.
     Difference([Picture<'a>; 2], f32),
 }
 
-/// A picture with its file's name and what is said about it.
+/// A picture with its file's name and its caption.
 pub struct Exhibit<'a> {
     pub name: &'a str,
     pub caption: &'a str,
@@ -52,7 +52,7 @@ pub fn all(scenes: &Scenes) -> Vec<Room<'_>> {
     ]
 }
 
-/// Looks along +z from the origin, with a focal length in pixels.
+/// A camera at the origin that looks along +z, with a focal length in pixels.
 fn camera(focal: f32) -> Camera<'static> {
     let [width, height] = SIZE.map(|side| side as f32);
     Camera::default()
@@ -79,7 +79,7 @@ fn picture(splats: &[Splat], focal: f32) -> Picture<'_> {
     }
 }
 
-/// A picture in another state.
+/// A picture with another state.
 fn with<'a>(
     picture: Picture<'a>,
     change: impl FnOnce(State<'static>) -> State<'static>,
@@ -122,10 +122,14 @@ fn cameras(scenes: &Scenes) -> Room<'_> {
     let aside = camera(80.0).principal_point([0.2 * width, 0.8 * height]);
     Room {
         title: "Cameras",
-        text: "Gaussians on a sphere about the eye, of a hue for each longitude, the horizon white.",
+        text: "Gaussians on a sphere around the eye. Each longitude has its own hue, and the horizon is white.",
         exhibits: vec![
             drawn("pinhole", "`PINHOLE`", by(camera(80.0))),
-            drawn("off-centre", "its principal point elsewhere", by(aside)),
+            drawn(
+                "off-centre",
+                "`PINHOLE`, another principal point",
+                by(aside),
+            ),
             drawn(
                 "orthographic",
                 "`ORTHOGRAPHIC`",
@@ -149,8 +153,8 @@ fn projections(scenes: &Scenes) -> Room<'_> {
     };
     Room {
         title: "Projection",
-        text: "Gaussians that point away from the eye, in a field 137 degrees wide. The Jacobian knows how their middles move; the \
-               unscented transform knows their ends, too.",
+        text: "Gaussians that are elongated away from the eye, in a field of view of 137 degrees. The Jacobian depends \
+               only on their centres; the unscented transform also uses points away from the centres.",
         exhibits: vec![
             drawn("jacobian", "`JACOBIAN`", one(Linearization::JACOBIAN)),
             drawn("unscented", "`UNSCENTED`", one(Linearization::UNSCENTED)),
@@ -170,8 +174,8 @@ fn shaders(scenes: &Scenes) -> Room<'_> {
     };
     Room {
         title: "Shaders",
-        text: "A vertex shader that projects as the device does, and fragment shaders that make colours of what accumulates: of \
-               its colour and alpha, or of its depths.",
+        text: "A vertex shader that projects as the device does, and resolve shaders that compute colours from the \
+               accumulated colour and alpha or from the depths.",
         exhibits: vec![
             drawn("fixed-function", "`FIXED_FUNCTION`", fixed()),
             drawn("vertex-shader", "`VERTEX_SHADER`", shaded()),
@@ -188,12 +192,12 @@ fn shaders(scenes: &Scenes) -> Room<'_> {
             ),
             drawn(
                 "resolve-expected",
-                "of the expected depth",
+                "a resolve shader of the expected depth",
                 resolved(Resolve::Expected),
             ),
             drawn(
                 "resolve-median",
-                "of the median depth",
+                "a resolve shader of the median depth",
                 resolved(Resolve::Median),
             ),
         ],
@@ -204,9 +208,9 @@ fn orders(scenes: &Scenes) -> Room<'_> {
     let one = |order| with(picture(&scenes.crossing, 60.0), |state| state.order(order));
     Room {
         title: "Orders",
-        text: "Two sheets that pass through one another in the middle, and at the sides pairs of which one is deeper and the other \
-               farther off: front to back by depth along the view, by distance from the eye, as they are drawn, and at \
-               each pixel by where they are greatest along its ray.",
+        text: "Two crossing sheets, and at the sides pairs of Gaussians: one has the greater depth, the other the \
+               greater distance from the eye. The orders are by depth, by distance, by position in the draw, and at \
+               each pixel by the depth on its ray at which the Gaussian is greatest.",
         exhibits: vec![
             drawn("order-view-depth", "`VIEW_DEPTH`", one(Order::VIEW_DEPTH)),
             drawn(
@@ -227,7 +231,7 @@ fn merged(scenes: &Scenes) -> Room<'_> {
     };
     Room {
         title: "Several draws",
-        text: "Two rings that are linked, a draw each. One draw is composited after the other, or they share a sorted set.",
+        text: "Two linked rings, each a draw. The draws are composited one after the other, or they are one sorted set.",
         exhibits: vec![
             drawn("draws", "draws in their order", apart()),
             drawn(
@@ -251,8 +255,8 @@ fn geometry(scenes: &Scenes) -> Room<'_> {
     };
     Room {
         title: "Geometry",
-        text: "Round discs on a floor and on walls, near the eye. As volumes they are ellipses about the pictures of their middles; \
-               where rays meet discs exactly, the near half is larger.",
+        text: "Round discs on a floor and on walls, near the eye. As volumes their pictures are ellipses around the \
+               projected centres. As discs they are intersected with each pixel's ray, and the near half is larger.",
         exhibits: vec![
             drawn("volumes", "`GAUSSIAN_3D`", volumes()),
             drawn("discs", "`GAUSSIAN_2D`", discs()),
@@ -271,7 +275,8 @@ fn precision(scenes: &Scenes) -> Room<'_> {
     let half = || with(single(), |state| state.precision(Precision::FLOAT16));
     Room {
         title: "Precision",
-        text: "Needles that lean, of which binary16 loses the middle, and many faint layers, of each of which it rounds the sum.",
+        text: "Tilted needles, whose centre lines are not accurate in binary16, and many faint layers, whose sum is \
+               rounded after each layer.",
         exhibits: vec![
             drawn("binary32", "`FLOAT32`", single()),
             drawn("binary16", "`FLOAT16`", half()),
@@ -294,8 +299,8 @@ fn antialiasing(scenes: &Scenes) -> Room<'_> {
     let (dilate, compensate) = (Antialiasing::DILATE, Antialiasing::OPACITY_COMPENSATED);
     Room {
         title: "Anti-aliasing",
-        text: "Needles thinner than a pixel, more so to the right. A filter widens all of them; compensation makes them \
-               fainter by as much.",
+        text: "Needles thinner than a pixel, and thinner to the right. The low-pass filter widens all of them; \
+               compensation reduces their opacity accordingly.",
         exhibits: vec![
             drawn("unfiltered", "no filter", one(0.0, dilate)),
             drawn("dilated", "`DILATE`, 0.3 px^2", one(0.3, dilate)),
@@ -318,9 +323,10 @@ fn limits(scenes: &Scenes) -> Room<'_> {
         |change: fn(State<'static>) -> State<'static>| with(picture(&scenes.still, 150.0), change);
     Room {
         title: "Floors and ceilings",
-        text: "Where a Gaussian ends, how opaque it may be, and when a pixel is finished.",
+        text: "The alpha floor, at which a Gaussian ends; the ceiling of alpha; and the transmittance floor, at which a \
+               pixel is finished.",
         exhibits: vec![
-            drawn("limits", "as 3DGS has them", one(|state| state)),
+            drawn("limits", "the values of 3DGS", one(|state| state)),
             drawn(
                 "alpha-floor",
                 "`alphaFloor` 0.3",
@@ -340,7 +346,7 @@ fn limits(scenes: &Scenes) -> Room<'_> {
     }
 }
 
-/// A triangle across the picture, half as deep as the still life.
+/// A triangle across the picture, at half the depth of the still life.
 fn triangle() -> Option<Triangle> {
     let [c0, c1] = camera(1.0).depth_coefficients;
     Some(Triangle {
@@ -362,7 +368,7 @@ fn triangles(scenes: &Scenes) -> Room<'_> {
     };
     Room {
         title: "Depth and samples",
-        text: "Gaussians in front of a triangle and behind it, which share its depth buffer.",
+        text: "Gaussians in front of a triangle and behind it, tested with its depth buffer.",
         exhibits: vec![
             drawn("still-life", "no triangle", picture(&scenes.still, 150.0)),
             drawn("depth", "one sample", one(Samples::TYPE_1, false)),
@@ -385,7 +391,8 @@ fn instances(scenes: &Scenes) -> Room<'_> {
     };
     Room {
         title: "Instances",
-        text: "One model, placed by a matrix for each instance and sorted together; the last rows fade.",
+        text: "One model, drawn with a matrix for each instance. All instances are sorted together, and the last rows \
+               are fainter.",
         exhibits: vec![
             drawn("model", "the model", picture(&scenes.flower, 280.0)),
             drawn("instances", "60 of them in one draw", many),

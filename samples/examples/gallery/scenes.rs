@@ -1,4 +1,4 @@
-//! What the pictures show.
+//! The scenes of the pictures.
 
 use crate::gpu::{Instance, Splat};
 use std::f32::consts::{PI, TAU};
@@ -20,17 +20,17 @@ fn splat(
     [x, y, z, sx, sy, sz, qw, qx, qy, qz, opacity, r, g, b]
 }
 
-/// A colour around the circle of hues, from 0 to 1.
+/// A colour of the hue circle; `at` is from 0 to 1.
 fn hue(at: f32) -> [f32; 3] {
     [0.0, 1.0 / 3.0, 2.0 / 3.0].map(|shift| 0.5 + 0.45 * (TAU * (at - shift)).cos())
 }
 
-/// A turn by `angle` about z.
+/// The rotation by `angle` about z.
 fn turned(angle: f32) -> [f32; 4] {
     [(angle / 2.0).cos(), 0.0, 0.0, (angle / 2.0).sin()]
 }
 
-/// Everything that is shown.
+/// All scenes.
 pub struct Scenes {
     pub around: Vec<Splat>,
     pub wide: Vec<Splat>,
@@ -61,14 +61,15 @@ impl Scenes {
     }
 }
 
-/// A turn by `angle` about an axis.
+/// The rotation by `angle` about an axis.
 fn turned_about(axis: usize, angle: f32) -> [f32; 4] {
     let mut quaternion = [(angle / 2.0).cos(), 0.0, 0.0, 0.0];
     quaternion[1 + axis] = (angle / 2.0).sin();
     quaternion
 }
 
-/// Two sheets that cross, and pairs beside them, of which the deeper is nearer. What is in front by depth comes last.
+/// Two crossing sheets, and pairs of Gaussians at their sides in which the one with the greater depth has the smaller
+/// distance. Gaussians with smaller depths come last.
 fn crossing() -> Vec<Splat> {
     let sheet = [0.75, 0.55, 0.01];
     let mut splats = vec![
@@ -107,16 +108,16 @@ fn crossing() -> Vec<Splat> {
     splats
 }
 
-/// How many Gaussians each ring of [`links`] has.
+/// The number of Gaussians of each ring of [`links`].
 pub const RINGS: [u32; 2] = [40, 40];
 
-/// Two rings, each through the other.
+/// Two linked rings.
 fn links() -> Vec<Splat> {
     let mut splats = Vec::new();
     for (ring, count) in RINGS.into_iter().enumerate() {
         for i in 0..count {
             let (sin, cos) = (TAU * i as f32 / count as f32).sin_cos();
-            // One stands upright, the other lies and leans.
+            // One ring is vertical, the other is horizontal and tilted.
             let position = match ring {
                 0 => [0.75 * cos - 0.4, 0.75 * sin, MIDDLE + 0.2 * cos],
                 _ => [0.75 * cos + 0.4, 0.25 * sin, MIDDLE + 0.7 * sin],
@@ -154,7 +155,7 @@ fn floor() -> Vec<Splat> {
     splats
 }
 
-/// Needles that lean behind layers that are hardly there.
+/// Tilted needles behind nearly transparent layers.
 fn veils() -> Vec<Splat> {
     let mut splats = Vec::new();
     for i in 0..60 {
@@ -180,7 +181,7 @@ fn veils() -> Vec<Splat> {
     splats
 }
 
-/// Needles that grow thinner to the right.
+/// Needles that become thinner to the right.
 fn needles() -> Vec<Splat> {
     (0..24)
         .map(|i| {
@@ -192,7 +193,7 @@ fn needles() -> Vec<Splat> {
         .collect()
 }
 
-/// Gaussians on a sphere.
+/// Gaussians on a sphere around the eye.
 fn around() -> Vec<Splat> {
     let mut splats = Vec::new();
     for ring in -4..=4i32 {
@@ -215,7 +216,7 @@ fn around() -> Vec<Splat> {
     splats
 }
 
-/// Gaussians on a plane across the view, that point away from it.
+/// Gaussians on a plane across the view, each elongated away from it.
 fn wide() -> Vec<Splat> {
     let mut splats = Vec::new();
     for row in -2..=2i32 {
@@ -229,7 +230,7 @@ fn wide() -> Vec<Splat> {
     splats
 }
 
-/// Rings of Gaussians in front of one another.
+/// Rings of Gaussians, one in front of another.
 fn still_life() -> Vec<Splat> {
     let mut splats = Vec::new();
     for ring in 0..3 {
@@ -247,7 +248,7 @@ fn still_life() -> Vec<Splat> {
     splats
 }
 
-/// Petals about a middle, on a stem.
+/// Petals around a centre, on a stem.
 fn flower() -> Vec<Splat> {
     let z = 4.0;
     let mut splats = vec![
@@ -282,7 +283,7 @@ fn flower() -> Vec<Splat> {
     splats
 }
 
-/// Where the flowers of a meadow stand, turned, leaning and of many sizes.
+/// The placements of the flowers of a meadow: rotated, sheared and of many sizes.
 fn meadow() -> Vec<Instance> {
     let mut instances = Vec::new();
     for row in 0..6 {
@@ -294,7 +295,7 @@ fn meadow() -> Vec<Instance> {
             let (sin, cos) = (1.2 * random(37.7)).sin_cos();
             let depth = 2.2 + 1.1 * row as f32;
             let x = 0.36 * depth * (column as f32 - 4.5 + 0.4 * random(93.9)) / 2.2;
-            // About y, then sheared; the model stands around (0, 0, 4).
+            // Rotated about y, then sheared. The model is around (0, 0, 4).
             let rows = [
                 [size * cos, size * lean, size * sin],
                 [0.0, size, 0.0],

@@ -1,6 +1,6 @@
 #version 450
-// A resolve shader: once for each pixel, what Gaussians accumulated there becomes a colour. The further off they are by
-// their expected depth, the more fog is in front; then tones are mapped.
+// A resolve shader, which runs once for each pixel. It computes a colour from the accumulated values of the pixel: more
+// fog with a greater expected depth, and then tone mapping.
 
 layout(location = 0) in vec4 accumulated;
 layout(location = 1) in vec2 depth;

@@ -1,9 +1,9 @@
 #version 450
-// What the device's own projection does for a pinhole at the origin that looks along +z, as a vertex shader: one Gaussian
-// per invocation.
+// The device's fixed-function projection as a vertex shader, for a pinhole at the origin that looks along +z. Each
+// invocation projects one Gaussian.
 
 layout(push_constant) uniform Camera {
-    vec2 size; // Of the picture, in pixels.
+    vec2 size; // The picture's size in pixels.
     vec2 focal;
 };
 
@@ -13,7 +13,7 @@ layout(location = 2) in vec4 rotation; // w, x, y, z.
 layout(location = 3) in float opacity;
 layout(location = 4) in vec3 harmonic;
 
-// Where the pipeline says that they are.
+// The locations that the pipeline names.
 layout(location = 0) out vec3 covariance;
 layout(location = 1) out float opacity_out;
 layout(location = 2) out vec3 color;
@@ -29,7 +29,7 @@ void main() {
         2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y));
     mat3 axes = mat3(scale.x * turned[0], scale.y * turned[1], scale.z * turned[2]);
 
-    // The rows of the Jacobian, whose slopes end a little beyond the picture's edges.
+    // The rows of the Jacobian. Slopes are clamped a little beyond the picture's edges.
     vec3 t = position;
     vec2 slope = clamp(t.xy / t.z, -0.65 * size / focal, 0.65 * size / focal);
     vec3 across = focal.x / t.z * vec3(1.0, 0.0, -slope.x) * axes;

@@ -1,5 +1,5 @@
 #version 450
-// Resolve shaders: once for each pixel, what Gaussians accumulated there becomes a colour.
+// Resolve shaders, which run once for each pixel and compute a colour from its accumulated values.
 
 layout(constant_id = 0) const int KIND = 0;
 
@@ -10,7 +10,7 @@ layout(location = 0) out vec4 result;
 
 const float NEAR = 0.2, FAR = 100.0;
 
-// From red to blue with the distance from 2.8 to 5.2.
+// A colour from red to blue for a depth from 2.8 to 5.2.
 vec4 rainbow(float depth) {
     float distance = NEAR * FAR / (FAR - depth * (FAR - NEAR));
     float at = clamp((distance - 2.8) / 2.4, 0.0, 1.0);

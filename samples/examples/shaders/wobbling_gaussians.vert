@@ -1,11 +1,11 @@
 #version 450
-// Gaussians of the shader's own: rings of flat discs that wobble with time, a ring for each instance.
+// Makes Gaussians: rings of flat discs that wobble with time, one ring for each instance.
 
 layout(push_constant) uniform Frame {
     float time;
 };
 
-// Where the pipeline says that they are.
+// The locations that the pipeline names.
 layout(location = 0) out vec3 covariance;
 layout(location = 1) out float opacity;
 layout(location = 2) out vec3 color;
@@ -17,7 +17,7 @@ void main() {
     float ring = float(gl_InstanceIndex);
     float u = TAU * float(gl_VertexIndex % 96) / 96.0, v = TAU * float(gl_VertexIndex / 96) / 24.0;
 
-    // A torus whose tube swells, turned about an axis of its own.
+    // A torus with a tube of varying thickness, rotated about its own axis.
     float tube = 0.3 + 0.12 * sin(3.0 * u + time + 2.0 * ring);
     vec3 outward = vec3(cos(u) * cos(v), sin(u) * cos(v), sin(v));
     vec3 p = vec3(cos(u), sin(u), 0.0) + tube * outward;
@@ -38,7 +38,7 @@ void main() {
     color = hue * (0.25 + 2.5 * light);
     opacity = 0.85;
 
-    // What is nearer than another comes first: by w, since no location names a depth key.
+    // Gaussians are sorted by w, nearest first, since no location names a depth key.
     float depth = FAR / (FAR - NEAR) * (t.z - NEAR);
     gl_Position = vec4(2.0 * FOCAL / SIDE * t.xy, depth, t.z);
 }

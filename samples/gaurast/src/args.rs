@@ -1,4 +1,4 @@
-//! Arguments that commands share, and those of `gaurast render`.
+//! Arguments that several commands have, and those of `gaurast render`.
 
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -8,7 +8,7 @@ use gaurast_picture::{Background, DEFAULT_QUALITY, Size};
 use gaurast_scene::{MAX_SH_DEGREE, Transform};
 use glam::{DQuat, DVec3};
 
-/// What every command's help ends with.
+/// The text at the end of every command's help.
 pub const EXIT_CODES: &str = "Exit codes: 0 done, 1 it failed and one sentence on stderr says why, 2 the command line means \
     nothing.";
 
@@ -33,16 +33,17 @@ pub struct RenderArguments {
     pub report: ReportArguments,
 }
 
-/// What is drawn.
+/// The scene arguments.
 #[derive(Args, Clone, Debug, Default)]
 pub struct SceneArguments {
-    /// The scene: a file, a folder, or - for standard input; several are drawn together; a generated garden if there is none
+    /// The scene: a file, a folder, or - for standard input; several are drawn together; a generated garden if there is
+    /// none
     pub scenes: Vec<PathBuf>,
 
-    /// Put a scene elsewhere: "scale=F turn=X,Y,Z,DEGREES move=X,Y,Z", each if wanted
+    /// Place a scene: "scale=F turn=X,Y,Z,DEGREES move=X,Y,Z", each part optional
     ///
-    /// The first one is of the first scene, the second of the second, and so on; "" leaves a scene where it is. It is scaled
-    /// first, then turned about an axis through the origin, then moved.
+    /// The first value belongs to the first scene, the second to the second, and so on; "" leaves a scene where it is.
+    /// The scene is scaled first, then rotated about an axis through the origin, then moved.
     #[arg(long, value_name = "SPEC", allow_hyphen_values = true)]
     pub transform: Vec<Placement>,
 
@@ -81,7 +82,7 @@ impl FromStr for Placement {
     }
 }
 
-/// Where the scene is seen from.
+/// The camera arguments.
 #[derive(Args, Clone, Default)]
 #[command(next_help_heading = "Camera")]
 pub struct CameraArguments {
@@ -89,10 +90,10 @@ pub struct CameraArguments {
     #[arg(long, value_name = "FILE", conflicts_with_all = ["eye", "target", "up", "fov", "azimuth", "elevation", "distance", "orbit", "path"])]
     pub cameras: Option<PathBuf>,
 
-    /// Which cameras of the file: an index from 0, a range such as 3..7 or 0..100:10, a name, or all
+    /// The cameras of the file: an index from 0, a range such as 3..7 or 0..100:10, a name, or all
     ///
-    /// May be given more than once. A range holds both of its ends; what is after the colon is its step. A name is
-    /// that of a photograph, with or without its folder and its extension.
+    /// May be given more than once. A range includes both of its ends; the number after the colon is its step. A name
+    /// is that of a photograph, with or without its folder and its extension.
     #[arg(
         long,
         value_name = "N|N..M|NAME|all",
@@ -101,21 +102,23 @@ pub struct CameraArguments {
     )]
     pub view: Vec<String>,
 
-    /// nerfstudio's dataparser_transforms.json, which lies beside the trained model
+    /// nerfstudio's dataparser_transforms.json, which is next to the trained model
     ///
-    /// nerfstudio trains in a frame and at a scale of its own; this takes the cameras of its transforms.json there.
+    /// nerfstudio trains in coordinates and at a scale of its own; this option converts the cameras of its
+    /// transforms.json to them.
     #[arg(long, value_name = "FILE", requires = "cameras")]
     pub dataparser: Option<PathBuf>,
 
-    /// Draw with cameras whose lens distorts as if it did not
+    /// Ignore the lens distortion of cameras
     ///
-    /// Without it, a camera with distortion is refused. nerfstudio and gsplat train on undistorted pictures.
+    /// Without this option, a camera with distortion is refused. nerfstudio and gsplat train on undistorted pictures.
     #[arg(long)]
     pub undistorted: bool,
 
     /// The camera's position
     ///
-    /// Without it, the camera has the whole scene in the picture; a panorama and a fisheye stand in its middle.
+    /// Without it, the camera is placed so that the whole scene is in the picture; a panorama and a fisheye are placed
+    /// in the scene's middle.
     #[arg(
         long,
         value_name = "X,Y,Z",
@@ -134,59 +137,59 @@ pub struct CameraArguments {
     )]
     pub target: Option<Triple>,
 
-    /// The direction that is upwards, in the scene and in the picture [default: 0,-1,0]
+    /// The upward direction of the scene, which is also up in the picture [default: 0,-1,0]
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub up: Option<Triple>,
 
-    /// From which side: 0 is the front, 90 the right, 180 the back [default: 19.3]
+    /// The side from which the scene is seen: 0 is the front, 90 the right, 180 the back [default: 19.3]
     ///
     /// `gaurast views SCENE` shows eight of them.
     #[arg(long, value_name = "DEGREES", allow_hyphen_values = true, value_parser = finite)]
     pub azimuth: Option<f64>,
 
-    /// From how far above the horizon, -90 to 90 [default: 18.3; 0 inside]
+    /// The camera's elevation above the horizon, -90 to 90 degrees [default: 18.3; 0 inside]
     #[arg(long, value_name = "DEGREES", allow_hyphen_values = true, value_parser = elevation)]
     pub elevation: Option<f64>,
 
-    /// From how far off the scene's middle, in its units [default: all of it is in the picture]
+    /// The camera's distance from the scene's middle, in the scene's units [default: the whole scene is in the picture]
     #[arg(long, value_name = "D", value_parser = positive)]
     pub distance: Option<f64>,
 
-    /// How many times larger than otherwise the picture's contents are
+    /// The magnification of the picture's contents
     #[arg(long, value_name = "FACTOR", value_parser = positive)]
     pub zoom: Option<f64>,
 
-    /// N views evenly around the scene, or around the target
+    /// N views evenly spaced around the scene, or around the target
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000), conflicts_with = "path")]
     pub orbit: Option<u32>,
 
     /// Views along a smooth path through the keyframes of a file
     ///
-    /// A JSON list of {"eye": [x,y,z], "target": [x,y,z]}, with "up", "fov" and "time" where they are wanted, as
-    /// --frame prints them.
+    /// The file is a JSON list of {"eye": [x,y,z], "target": [x,y,z]}, with optional "up", "fov" and "time", as --frame
+    /// prints them.
     #[arg(long, value_name = "FILE.json", conflicts_with_all = ["eye", "target", "up", "fov", "azimuth", "elevation", "distance"])]
     pub path: Option<PathBuf>,
 
-    /// How many views there are along the path [default: its keyframes]
+    /// The number of views along the path [default: its keyframes]
     #[arg(long, value_name = "N", requires = "path", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub frames: Option<u32>,
 
-    /// How the camera projects
+    /// The camera's projection
     ///
-    /// An equirectangular picture is a panorama of 360 by 180 degrees about the camera's position, with the direction
-    /// in which it looks in the middle; give it twice as many columns as rows.
+    /// An equirectangular picture is a panorama of 360 by 180 degrees around the camera's position, with the viewing
+    /// direction in its middle. It should have twice as many columns as rows.
     #[arg(long = "camera", value_name = "MODEL", value_enum, default_value_t)]
     pub model: CameraModel,
 
-    /// The vertical field of view; of no account for a panorama [default: 50; 42 for the garden; 180 for a fisheye]
+    /// The vertical field of view in degrees; unused for a panorama [default: 50; 42 for the garden; 180 for a fisheye]
     #[arg(long, value_name = "DEGREES", value_parser = field_of_view)]
     pub fov: Option<f64>,
 
-    /// Leave out what is nearer than this [default: 0.2 as 3DGS, less where the scene is small]
+    /// The near plane: nearer Gaussians are not drawn [default: 0.2 as in 3DGS, less if the scene is small]
     #[arg(long, value_name = "Z", value_parser = positive)]
     pub near: Option<f64>,
 
-    /// Leave out what is farther off than this [default: nothing]
+    /// The far plane: Gaussians farther away are not drawn [default: none]
     #[arg(long, value_name = "Z", value_parser = positive)]
     pub far: Option<f64>,
 
@@ -199,7 +202,7 @@ pub struct CameraArguments {
     pub frame: bool,
 }
 
-/// How Gaussians are drawn.
+/// The drawing modes of Gaussians.
 #[derive(Args, Clone, Debug, Default)]
 #[command(next_help_heading = "Drawing")]
 pub struct ModeArguments {
@@ -207,15 +210,15 @@ pub struct ModeArguments {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(..=i64::from(MAX_SH_DEGREE)))]
     pub sh_degree: Option<u32>,
 
-    /// What the Gaussians are sorted by
+    /// The order in which Gaussians are sorted
     #[arg(long, value_enum, default_value_t)]
     pub order: Order,
 
-    /// What the Gaussians are
+    /// The shape of Gaussians
     #[arg(long, value_enum, default_value_t)]
     pub geometry: Geometry,
 
-    /// What becomes of Gaussians that are smaller than a pixel
+    /// The treatment of Gaussians that are smaller than a pixel
     #[arg(long, value_enum, default_value_t)]
     pub antialiasing: Antialiasing,
 
@@ -223,51 +226,50 @@ pub struct ModeArguments {
     #[arg(long, value_enum, default_value_t)]
     pub precision: Precision,
 
-    /// Let the exponential err by at most this, relative to it
+    /// Allow this relative error of the exponential
     #[arg(long, value_name = "E", default_value_t = 0.0, value_parser = part)]
     pub exponential_error: f32,
 
-    /// Leave contributions out whose weights at a pixel add up to at most this
+    /// Leave out contributions whose weights at a pixel add up to at most this
     ///
-    /// A pixel errs by at most the budget times the brightest colour that is left out, which may exceed 1: with 0.004,
-    /// one of 255 steps, real scenes err by up to 1.16 steps, and rounding to 8 bits may add one.
+    /// The error of a pixel is at most the budget times the brightest colour that is left out, which may exceed 1. With
+    /// 0.004, one of 255 steps, trained scenes have errors of up to 1.16 steps, and rounding to 8 bits may add one.
     #[arg(long, value_name = "B", default_value_t = 0.0, value_parser = part)]
     pub contribution_budget: f32,
 }
 
-/// What is written, and where.
+/// The output arguments.
 #[derive(Args, Default)]
 #[command(next_help_heading = "Output")]
 pub struct OutputArguments {
-    /// Where the picture goes; may be given more than once [default: the scene's name with .png]
+    /// The file, folder or video for the pictures; may be given more than once [default: the scene's name with .png]
     ///
-    /// PNG and WebP (without losses) and JPEG have 8 bits, with colours as they are trained; EXR has 32-bit floats.
-    /// Several views go to a pattern such as view_%04d.png, to a folder (its name ends in /), to a video (.mp4 or
-    /// .webm, made by an ffmpeg on the PATH), or one after the other as PNG to standard output (-).
+    /// PNG and WebP (lossless) and JPEG have 8 bits, with colours as they are trained; EXR has 32-bit floats. Several
+    /// views go to a pattern such as view_%04d.png, to a folder (its name ends in /), to a video (.mp4 or .webm, made
+    /// by an ffmpeg on the PATH), or one after the other as PNG to standard output (-).
     #[arg(short, long, value_name = "FILE")]
     pub output: Vec<PathBuf>,
 
-    /// Replace files that are there
+    /// Replace existing files
     #[arg(long)]
     pub force: bool,
 
-    /// Keep files that are there, and draw only the views that lack one
+    /// Keep existing files, and draw only the views without a file
     ///
-    /// Files appear whole or not at all, so one that is there is complete.
+    /// Files are written as a whole, so an existing file is complete.
     #[arg(long, conflicts_with = "force")]
     pub resume: bool,
 
-    /// Draw only every n-th view, from the i-th on: i is 0 to n - 1
+    /// Draw only every n-th view, starting with the i-th: i is 0 to n - 1
     ///
-    /// Several machines or processes share views so: --shard $SLURM_ARRAY_TASK_ID/8.
+    /// With it, several machines or processes can divide the views: --shard $SLURM_ARRAY_TASK_ID/8.
     #[arg(long, value_name = "I/N")]
     pub shard: Option<Shard>,
 
-    /// What is behind the scene: transparent, a name, #rgb, #rrggbb, or R,G,B, each 0 to 1
+    /// The background of the scene: transparent, a name, #rgb, #rrggbb, or R,G,B, each 0 to 1
     ///
-    /// The scene is composited over a colour: C + T background, with alpha 1. Without it, EXR files
-    /// hold (C, 1 - T), premultiplied, and the other files are opaque over black. Transparent PNG and WebP files have
-    /// straight alpha.
+    /// The scene is composited over a colour: C + T background, with alpha 1. By default, EXR files hold premultiplied
+    /// (C, 1 - T), and other files are opaque over black. Transparent PNG and WebP files have straight alpha.
     #[arg(long, value_name = "COLOUR", allow_hyphen_values = true)]
     pub background: Option<Background>,
 
@@ -275,38 +277,38 @@ pub struct OutputArguments {
     #[arg(long, value_name = "Q", default_value_t = DEFAULT_QUALITY, value_parser = clap::value_parser!(u8).range(1..=100))]
     pub quality: u8,
 
-    /// EXR files hold linear light instead of colours as they are trained, which are sRGB
+    /// Write linear light to EXR files, in place of the trained colours, which are sRGB
     #[arg(long)]
     pub linear: bool,
 
-    /// EXR files hold depths, too: the median as Z, the expected one as expected.Z
+    /// Write depths to EXR files, too: the median as Z, the expected one as expected.Z
     #[arg(long)]
     pub depth: bool,
 
-    /// Also draw how many Gaussians contribute to a pixel, as the mean of each 16x16 tile
+    /// Also draw the number of Gaussians that contribute to a pixel, as the mean of each 16x16 tile
     #[arg(long, value_name = "FILE")]
     pub heatmap: Option<PathBuf>,
 
-    /// Frames of a video in a second
+    /// The frames per second of a video
     #[arg(long, value_name = "N", default_value_t = 30.0, value_parser = positive)]
     pub fps: f64,
 
-    /// Standard output gets raw frames, 3 bytes a pixel, instead of PNG
+    /// Write raw frames to standard output, 3 bytes a pixel, instead of PNG
     #[arg(long)]
     pub raw: bool,
 }
 
-/// What is told.
+/// The reporting arguments.
 #[derive(Args, Clone, Copy, Default)]
 #[command(next_help_heading = "Report")]
 pub struct ReportArguments {
-    /// Print what each stage of the device did, as far as it did something
+    /// Print the counters of each stage of the device that are not zero
     #[arg(long)]
     pub stats: bool,
 
-    /// Count also what the simulated hardware would spend: cycles, stalls, energy
+    /// Also count the cost on the simulated hardware: cycles, stalls, energy
     ///
-    /// `gaurast simulate` tells more, of any hardware.
+    /// `gaurast simulate` gives more detail, for any hardware.
     #[arg(long)]
     pub counters: bool,
 
@@ -314,7 +316,7 @@ pub struct ReportArguments {
     #[arg(long)]
     pub json: bool,
 
-    /// Fail where a picture has nothing in it, instead of saying so
+    /// Fail if a picture is empty, instead of only reporting it
     #[arg(long)]
     pub strict: bool,
 
@@ -323,44 +325,44 @@ pub struct ReportArguments {
     pub quiet: bool,
 }
 
-/// What `--camera` may be.
+/// Values of `--camera`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum CameraModel {
-    /// Perspective, or what the camera file says
+    /// Perspective, or the camera file's model
     #[default]
     Pinhole,
     /// An equidistant fisheye
     Fisheye,
     /// A panorama by longitude and latitude
     Equirectangular,
-    /// Parallel rays
+    /// An orthographic projection
     Orthographic,
 }
 
 /// Values of `--order`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum Order {
-    /// What the file says; depth where it says nothing
+    /// As in the file; depth if the file has no order
     #[default]
     Auto,
     /// Depth along the camera's axis, as 3DGS does
     Depth,
     /// Distance from the camera
     Distance,
-    /// Depth along each pixel's own ray: nothing pops as the camera turns
+    /// Depth along each pixel's own ray: nothing pops as the camera rotates
     PerPixel,
 }
 
 /// Values of `--geometry`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum Geometry {
-    /// What the file says; volumes where it says nothing
+    /// As in the file; volumes if the file has no shape
     #[default]
     Auto,
-    /// Volumes with three axes, as of 3DGS
+    /// Volumes with three axes, as in 3DGS
     #[value(name = "3d")]
     Volume,
-    /// Flat discs with two, as of 2DGS; a third scale is not looked at
+    /// Flat discs with two axes, as in 2DGS; a third scale is ignored
     #[value(name = "2d")]
     Surfel,
 }
@@ -368,12 +370,12 @@ pub enum Geometry {
 /// Values of `--antialiasing`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum Antialiasing {
-    /// What the file says; off where it says nothing
+    /// As in the file; off if the file has no setting
     #[default]
     Auto,
-    /// They are dilated and keep their opacity, as 3DGS does
+    /// Gaussians are dilated and keep their opacity, as in 3DGS
     Off,
-    /// Their opacity makes up for the dilation: for scenes that are trained so
+    /// Their opacity compensates for the dilation: for scenes that are trained so
     Compensated,
 }
 
@@ -396,7 +398,7 @@ impl From<Precision> for gaurast_render::Precision {
     }
 }
 
-/// A share of the views: those whose place leaves `index` when divided by `count`.
+/// A share of the views: those whose index divided by `count` has the remainder `index`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {
     pub index: usize,
@@ -419,7 +421,7 @@ impl FromStr for Shard {
     }
 }
 
-/// Three finite numbers with commas between them.
+/// Three finite numbers separated by commas.
 #[derive(Clone, Copy, Debug)]
 pub struct Triple(pub [f64; 3]);
 

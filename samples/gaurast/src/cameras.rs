@@ -1,4 +1,4 @@
-//! The cameras that the command line asks for.
+//! The cameras for which the command line asks.
 
 use std::path::PathBuf;
 
@@ -11,13 +11,13 @@ use thiserror::Error;
 use crate::args::{CameraArguments, CameraModel};
 use crate::sources::{Source, stem};
 
-/// The picture's size where nothing says otherwise.
+/// The default size of pictures.
 pub const DEFAULT_SIZE: [u32; 2] = [1280, 720];
 
-/// The vertical field of view of a fisheye where none is given, in degrees.
+/// The default vertical field of view of a fisheye, in degrees.
 const FISHEYE_FOV: f64 = 180.0;
 
-/// Why there are no cameras. Displayed as one sentence.
+/// An error of the cameras. Displayed as one sentence.
 #[derive(Debug, Error)]
 pub enum ViewError {
     #[error(transparent)]
@@ -55,41 +55,41 @@ pub enum ViewError {
 }
 
 impl ViewError {
-    /// Tells if the command line means nothing, whatever the files hold.
+    /// Returns true if the command line is invalid whatever the files contain.
     pub fn is_misuse(&self) -> bool {
         matches!(self, Self::NoCameras | Self::Range(_))
     }
 }
 
-/// A picture that is asked for.
+/// A requested picture: its camera and its name.
 #[derive(Clone, Debug)]
 pub struct View {
-    /// The photograph's name, if the camera is a photograph's.
+    /// The photograph's name, if the camera belongs to one.
     pub name: Option<String>,
     pub camera: Camera,
 }
 
-/// What is asked for.
+/// The requested views.
 #[derive(Debug, Default)]
 pub struct Views {
     pub views: Vec<View>,
-    /// What a person should know, a sentence each.
+    /// Notes for the user, a sentence each.
     pub notes: Vec<String>,
-    /// How to have the view again, where it was chosen to suit the scene.
+    /// The options that give the same view again, if the view was chosen to fit the scene.
     pub framing: Option<String>,
 }
 
-/// Cameras that were read before the scene: their mistakes should not wait for a large one.
+/// Cameras that are known before the scene is read, so that their errors are reported first.
 pub enum Known {
-    /// Those of a camera file, chosen.
+    /// The selected cameras of a camera file.
     File(Views),
-    /// Those of a path.
+    /// The cameras of a path.
     Path(Vec<Camera>),
-    /// The scene decides.
+    /// The cameras depend on the scene.
     Scene,
 }
 
-/// Reads the camera file or the path, if one is asked for.
+/// Reads the camera file or the path, if the arguments have one.
 ///
 /// # Errors
 /// See [`ViewError`].
@@ -166,7 +166,7 @@ pub fn read(arguments: &CameraArguments, source: &Source) -> Result<Known, ViewE
     Ok(Known::File(views))
 }
 
-/// The cameras that see `scene`, in the models and with the planes that are asked for.
+/// The cameras for `scene`, with the requested models and planes.
 ///
 /// # Errors
 /// See [`ViewError`].
@@ -209,12 +209,12 @@ fn unnamed(cameras: impl Iterator<Item = Camera>) -> Views {
     }
 }
 
-/// A near plane that suits a small scene.
+/// The camera with a near plane that fits a small scene.
 fn with_near(camera: &Camera, extent: &Extent) -> Camera {
     camera.with_planes(camera.near.min(extent.near()), camera.far)
 }
 
-/// The camera in the model that is asked for.
+/// The camera with the requested model.
 fn projected(camera: &Camera, arguments: &CameraArguments, extent: &Extent) -> Camera {
     match arguments.model {
         CameraModel::Pinhole => camera.clone(),
@@ -222,7 +222,7 @@ fn projected(camera: &Camera, arguments: &CameraArguments, extent: &Extent) -> C
         CameraModel::Fisheye => camera.fisheye(arguments.fov.unwrap_or(FISHEYE_FOV)),
         CameraModel::Equirectangular => camera.panorama(),
         CameraModel::Orthographic => {
-            // What is in the middle of the scene, or looked at, is as large as a pinhole shows it.
+            // The middle of the scene, or the target, has the same size as with a pinhole.
             let middle = arguments.target.map_or(extent.centre, |target| target.0);
             let ahead = distance_ahead(camera, middle).max(1e-6 * extent.radius());
             let far = camera.far.min(ahead + 100.0 * extent.radius());
@@ -231,7 +231,7 @@ fn projected(camera: &Camera, arguments: &CameraArguments, extent: &Extent) -> C
     }
 }
 
-/// How far `point` is along the camera's axis.
+/// The distance of `point` along the camera's axis.
 fn distance_ahead(camera: &Camera, point: [f64; 3]) -> f64 {
     let [_, _, forward] = camera.rotation;
     (0..3)
@@ -239,7 +239,7 @@ fn distance_ahead(camera: &Camera, point: [f64; 3]) -> f64 {
         .sum()
 }
 
-/// The camera given by hand, or one that suits the scene; or an orbit from there.
+/// The camera given by options, or one that fits the scene; or an orbit that starts there.
 fn by_hand(arguments: &CameraArguments, extent: &Extent, garden: bool) -> Result<Views, ViewError> {
     let size = arguments.size.map_or(DEFAULT_SIZE, |size| size.0);
     let up = arguments.up.map_or(DEFAULT_UP, |up| up.0);
@@ -247,7 +247,7 @@ fn by_hand(arguments: &CameraArguments, extent: &Extent, garden: bool) -> Result
         arguments.model,
         CameraModel::Fisheye | CameraModel::Equirectangular
     );
-    // A fisheye's field of view is no pinhole's.
+    // A field of view for a fisheye does not fit a pinhole.
     let fov = arguments.fov.filter(|_| !inside);
     let framed = arguments.azimuth.is_some()
         || arguments.elevation.is_some()
@@ -302,7 +302,7 @@ fn by_hand(arguments: &CameraArguments, extent: &Extent, garden: bool) -> Result
     Ok(views)
 }
 
-/// Three numbers as an option takes them.
+/// Three numbers in the form of an option's value.
 fn triple(values: [f64; 3]) -> String {
     values.map(|value| format!("{value:.4}")).join(",")
 }
@@ -330,7 +330,7 @@ fn path_cameras(
     Ok(camera_path::along(&keyframes, count, size)?)
 }
 
-/// The indices of the views that `text` means.
+/// The indices of the views that `text` selects.
 fn choose(
     text: &str,
     path: &std::path::Path,
@@ -370,7 +370,7 @@ fn choose(
             Err(no_view(text))
         };
     }
-    // A number is an index, unless it is written as a photograph's name is.
+    // A number is an index, unless it has the form of a photograph's name.
     let leading_zero = text.len() > 1 && text.starts_with('0');
     if let (Ok(index), false) = (text.parse::<usize>(), leading_zero) {
         if index < count {
@@ -408,7 +408,7 @@ fn choose(
     }
 }
 
-/// The views as `--path` reads them.
+/// The views as keyframes for `--path`.
 pub fn keyframes(views: &[View], scene: &Scene) -> Vec<Keyframe> {
     let extent = Extent::of(scene);
     let keyframe = |view: &View| {

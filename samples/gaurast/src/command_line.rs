@@ -14,8 +14,8 @@ use crate::simulate::SimulateArguments;
 
 /// Renders scenes of 3D Gaussians on a software Vulkan device with a Gaussian primitive topology.
 ///
-/// Without a command, `gaurast` does what `gaurast render` does: `gaurast scene.ply` draws that file, and `gaurast`
-/// alone a generated garden.
+/// Without a command, `gaurast` works as `gaurast render`: `gaurast scene.ply` draws that file, and `gaurast` alone
+/// draws a generated garden.
 #[derive(Parser)]
 #[command(name = "gaurast", version, max_term_width = 100, after_help = EXIT_CODES)]
 pub struct Arguments {
@@ -29,13 +29,13 @@ pub enum Command {
     Render(Box<RenderArguments>),
     /// Draws a scene from eight sides on one labelled sheet, to find its front
     Views(Box<ViewsArguments>),
-    /// Tells how much two pictures, two folders of pictures, or a picture and a scene differ
+    /// Measures the difference of two pictures, two folders of pictures, or a picture and a scene
     Compare(Box<CompareArguments>),
-    /// Runs a program on this driver and on another one, and tells how much its pictures differ
+    /// Runs a program on this driver and on another one, and measures the differences of its pictures
     CompareDrivers(Box<CompareDriversArguments>),
-    /// Tells what a scene holds
+    /// Prints the contents of a scene
     Info(Box<InfoArguments>),
-    /// Tells what the simulated hardware would have spent on a scene: time, energy, area
+    /// Estimates the cost of a scene on the simulated hardware: time, energy, area
     Simulate(Box<SimulateArguments>),
     /// Prints a script that completes this command's arguments in a shell
     #[cfg(feature = "completions")]
@@ -46,7 +46,7 @@ pub enum Command {
     /// Writes manual pages
     #[cfg(feature = "completions")]
     Man {
-        /// The folder that they go to
+        /// The folder for the pages
         folder: PathBuf,
     },
 }
@@ -58,13 +58,14 @@ impl Default for Command {
 }
 
 impl Arguments {
-    /// Reads the command line; what is none ends the process with code 2.
+    /// Reads the command line. An invalid one ends the process with code 2.
     pub fn read() -> Self {
         Self::parse_from(with_command(std::env::args_os().collect()))
     }
 }
 
-/// The command line with `render` put in where it is meant: before options, and before what is or looks like a file.
+/// The command line with `render` inserted if the command is missing: before options, and before a word that is or
+/// looks like a file.
 fn with_command(mut words: Vec<std::ffi::OsString>) -> Vec<std::ffi::OsString> {
     let Some(first) = words.get(1).cloned() else {
         return words;

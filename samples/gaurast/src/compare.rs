@@ -1,4 +1,4 @@
-//! `gaurast compare`: how much pictures differ.
+//! `gaurast compare`: the difference of pictures.
 
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -16,7 +16,7 @@ use crate::progress::Progress;
 use crate::report::write_json;
 use crate::sources::{Source, SourceError, stem};
 
-/// Why nothing was compared. Displayed as one sentence.
+/// A failure of the comparison. Displayed as one sentence.
 #[derive(Debug, Error)]
 pub enum Error {
     #[error(transparent)]
@@ -60,7 +60,7 @@ pub enum Error {
 }
 
 impl Error {
-    /// Tells if the command line means nothing.
+    /// Returns true if the command line is invalid.
     pub fn is_misuse(&self) -> bool {
         matches!(self, Self::View(error) if error.is_misuse())
     }
@@ -77,7 +77,7 @@ pub struct CompareArguments {
     /// A picture, or a folder of pictures: .png, .jpg, .webp, .ppm or .exr
     pub a: PathBuf,
 
-    /// The reference: a picture, a folder of pictures, or a scene that is drawn for it
+    /// The reference: a picture, a folder of pictures, or a scene, which is drawn
     pub b: PathBuf,
 
     #[command(flatten)]
@@ -86,19 +86,20 @@ pub struct CompareArguments {
     #[command(flatten)]
     pub modes: ModeArguments,
 
-    /// What is behind the scene, and behind pictures that are transparent
+    /// The background of the scene and of transparent pictures
     #[arg(long, value_name = "COLOUR")]
     pub background: Option<Background>,
 
-    /// Write the absolute differences as a picture, the largest being white; a folder where folders are compared
+    /// Write the absolute differences as a picture, scaled so that the largest is white; a folder if folders are
+    /// compared
     #[arg(long, value_name = "FILE")]
     pub difference: Option<PathBuf>,
 
-    /// Replace files that are there
+    /// Replace existing files
     #[arg(long)]
     pub force: bool,
 
-    /// Fail where a picture's PSNR is below this
+    /// Fail if a picture's PSNR is below this
     #[arg(long, value_name = "DB")]
     pub fail_below: Option<f64>,
 
@@ -111,23 +112,23 @@ pub struct CompareArguments {
     pub quiet: bool,
 }
 
-/// Two pictures that are compared.
+/// Two pictures to compare.
 struct Pair {
     name: String,
     a: Picture,
     b: Picture,
-    /// Where their difference goes.
+    /// The file for their difference.
     difference: Option<PathBuf>,
 }
 
-/// How much two pictures differ.
+/// The result of comparing two pictures.
 struct Compared {
     name: String,
     statistics: Statistics,
     ssim: f64,
 }
 
-/// Compares and prints.
+/// Compares and prints the results.
 pub fn run(arguments: &CompareArguments) -> Result<(), Error> {
     let mut compared = Vec::new();
     if arguments.a.is_dir() {
@@ -186,7 +187,7 @@ pub fn run(arguments: &CompareArguments) -> Result<(), Error> {
     Ok(())
 }
 
-/// Checks that two pictures have one size.
+/// Checks that two pictures have the same size.
 pub fn check_sizes(a: &Picture, path: &Path, b: &Picture, other: &Path) -> Result<(), Error> {
     if (a.width, a.height) == (b.width, b.height) {
         return Ok(());
@@ -203,7 +204,7 @@ fn compare(pair: Pair, arguments: &CompareArguments) -> Result<Compared, Error> 
     let shown = |picture: &Picture| {
         let behind = arguments.background.map_or([0.0; 3], Background::color);
         let over = picture.over(behind);
-        // As a screen shows it.
+        // As a screen displays it.
         over.pixels
             .iter()
             .map(|pixel| pixel.map(|c| if c.is_nan() { 0.0 } else { c.clamp(0.0, 1.0) }))
@@ -234,7 +235,7 @@ fn compare(pair: Pair, arguments: &CompareArguments) -> Result<Compared, Error> 
     })
 }
 
-/// The scene, drawn for a picture of `size`.
+/// Draws the scene for a picture of `size`.
 fn draw(arguments: &CompareArguments, size: [u32; 2]) -> Result<Picture, Error> {
     let progress = Progress {
         quiet: arguments.quiet || arguments.json,
@@ -262,7 +263,7 @@ fn draw(arguments: &CompareArguments, size: [u32; 2]) -> Result<Picture, Error> 
         .over(background.map_or([0.0; 3], Background::color)))
 }
 
-/// The picture as a file of eight bits holds it.
+/// The picture after rounding to eight bits, as in a file.
 fn in_eight_bits(mut picture: Picture) -> Picture {
     for value in picture.pixels.as_flattened_mut() {
         *value = (255.0 * value.clamp(0.0, 1.0)).round() / 255.0;
@@ -270,7 +271,7 @@ fn in_eight_bits(mut picture: Picture) -> Picture {
     picture
 }
 
-/// The pictures of a folder, by name without extension.
+/// The pictures in a folder, by name without extension.
 fn pictures(folder: &Path) -> Result<BTreeMap<String, PathBuf>, Error> {
     let io = |source| Error::Io {
         path: folder.to_owned(),
@@ -291,7 +292,7 @@ fn pictures(folder: &Path) -> Result<BTreeMap<String, PathBuf>, Error> {
     Ok(found)
 }
 
-/// Names, and the files of both folders.
+/// The names that both folders have, each with both files.
 pub fn pairs(a: &Path, b: &Path) -> Result<Vec<(String, PathBuf, PathBuf)>, Error> {
     if !b.is_dir() {
         return Err(Error::Folder {
@@ -326,7 +327,7 @@ fn print(arguments: &CompareArguments, compared: &[Compared]) -> std::io::Result
         mean(&|one| one.statistics.flip),
     ];
     if arguments.json {
-        // JSON has no infinity: equal pictures have no PSNR.
+        // JSON has no infinity, which is the PSNR of equal pictures.
         let finite = |value: f64| value.is_finite().then_some(value);
         let one = |one: &Compared| {
             json!({

@@ -1,4 +1,4 @@
-//! `gaurast compare-drivers`: what a program draws on this driver and on another one.
+//! `gaurast compare-drivers`: the pictures of a program on this driver and on another one.
 
 use std::ffi::OsString;
 use std::fmt::Write as _;
@@ -23,16 +23,16 @@ const MANIFEST_FOLDERS: [&str; 4] = [
     "/usr/local/etc/vulkan/icd.d",
 ];
 
-/// The shared library of this driver, as `cargo build --release` leaves it beside the command.
+/// The shared library of this driver, which `cargo build --release` writes next to the command.
 const LIBRARY: &str = "libvulkan_gaurast.so";
 
-/// Text that stands for the folder of a driver's pictures in the program's arguments.
+/// The text in the program's arguments that stands for the folder of a driver's pictures.
 const PLACEHOLDER: &str = "{}";
 
-/// The step of eight-bit colours from which two neighbouring pixels are an edge.
+/// The difference of two neighbouring pixels, in eight-bit colours, that counts as an edge.
 const EDGE: f32 = 8.0 / 255.0;
 
-/// Why no drivers were compared. Displayed as one sentence.
+/// A failure of the comparison. Displayed as one sentence.
 #[derive(Debug, Error)]
 pub enum Error {
     #[error("{}: {source}", path.display())]
@@ -87,23 +87,23 @@ pub enum Error {
     may differ between two conformant drivers."
 )]
 pub struct CompareDriversArguments {
-    /// The other driver: the name of one that is installed, such as lavapipe, or its manifest, a .json file
+    /// The other driver: the name of an installed one, such as lavapipe, or its manifest, a .json file
     #[arg(long, value_name = "NAME|ICD.json", default_value = "lavapipe")]
     pub with: String,
 
-    /// This driver's manifest [default: of the library beside the command]
+    /// This driver's manifest [default: that of the library next to the command]
     #[arg(long, value_name = "ICD.json")]
     pub driver: Option<PathBuf>,
 
-    /// The folder for the pictures, and for the page that shows them side by side
+    /// The folder for the pictures, and for a page that shows them side by side
     #[arg(long, value_name = "FOLDER", default_value = "compared-drivers")]
     pub out: PathBuf,
 
-    /// Write into the folder although something is in it
+    /// Write into the folder even if it is not empty
     #[arg(long)]
     pub force: bool,
 
-    /// Fail where a picture has a difference of more than so many steps of 255
+    /// Fail if a picture has a difference of more than this many steps of 255
     #[arg(long, value_name = "STEPS")]
     pub fail_above: Option<f64>,
 
@@ -116,36 +116,36 @@ pub struct CompareDriversArguments {
     pub command: Vec<OsString>,
 }
 
-/// A driver that the program runs on.
+/// A driver on which the program runs.
 struct Driver {
     name: String,
     manifest: PathBuf,
-    /// Folder that its pictures go to.
+    /// The folder for its pictures.
     folder: PathBuf,
 }
 
-/// Differences of one picture between the drivers.
+/// The differences of one picture between the drivers.
 #[derive(Serialize)]
 struct Compared {
     name: String,
     width: u32,
     height: u32,
     equal: bool,
-    /// Pixels that differ at all.
+    /// The number of pixels that differ.
     differing_pixels: usize,
-    /// Differing pixels that lie on an edge.
+    /// The number of differing pixels that are on an edge.
     differing_on_edges: usize,
     /// The largest difference of a channel, in steps of 255.
     largest: f64,
-    /// In dB; none where the pictures are equal.
+    /// The PSNR in dB; `None` if the pictures are equal.
     psnr: Option<f64>,
     flip: f64,
 }
 
-/// Runs the program on both drivers, compares its pictures, and prints.
+/// Runs the program on both drivers, compares its pictures, and prints the results.
 pub fn run(arguments: &CompareDriversArguments) -> Result<(), Error> {
     prepare(arguments)?;
-    // The manifest of the library lies here for as long as the program runs.
+    // The library's manifest is in this folder while the program runs.
     let temporary = tempfile::tempdir().map_err(|source| Error::Io {
         path: std::env::temp_dir(),
         source,
@@ -211,7 +211,7 @@ pub fn run(arguments: &CompareDriversArguments) -> Result<(), Error> {
     Ok(())
 }
 
-/// Makes the folder, which is empty, or written into by `--force`.
+/// Creates the folder. It must be empty, unless `--force` is given.
 fn prepare(arguments: &CompareDriversArguments) -> Result<(), Error> {
     let io = |source| Error::Io {
         path: arguments.out.clone(),
@@ -233,7 +233,7 @@ fn absolute(path: &Path) -> Result<PathBuf, Error> {
     })
 }
 
-/// Writes a manifest of the library that lies beside this program.
+/// Writes a manifest of the library that is next to this program.
 fn manifest_of_library(folder: &Path) -> Result<PathBuf, Error> {
     let beside = std::env::current_exe().map_err(|source| Error::Io {
         path: PathBuf::from(LIBRARY),
@@ -255,7 +255,7 @@ fn manifest_of_library(folder: &Path) -> Result<PathBuf, Error> {
     Ok(manifest)
 }
 
-/// The manifest of the driver `name`: a path to one, or one that is installed and has the name in its own.
+/// The manifest of the driver `name`: a path to one, or an installed one whose name contains `name`.
 fn installed(name: &str) -> Result<PathBuf, Error> {
     if name.ends_with(".json") {
         return absolute(Path::new(name));
@@ -276,7 +276,7 @@ fn installed(name: &str) -> Result<PathBuf, Error> {
         })
         .collect();
     found.sort();
-    // A manifest for this processor comes before those for others, which Debian installs beside it.
+    // A manifest for this processor comes before those for others, which Debian installs in the same folder.
     let suits = |path: &&PathBuf| path.to_string_lossy().contains(std::env::consts::ARCH);
     let suitable = found.iter().find(suits).or(found.first());
     suitable.cloned().ok_or_else(|| Error::NoDriver {
@@ -284,7 +284,7 @@ fn installed(name: &str) -> Result<PathBuf, Error> {
     })
 }
 
-/// Runs the program to its end on a driver.
+/// Runs the program on a driver and waits for its end.
 fn start(driver: &Driver, command: &[OsString]) -> Result<(), Error> {
     let has_placeholder = |word: &OsString| word.to_string_lossy().contains(PLACEHOLDER);
     let placed = |word: &OsString| {
@@ -297,7 +297,7 @@ fn start(driver: &Driver, command: &[OsString]) -> Result<(), Error> {
     };
     let program = command.first().cloned().unwrap_or_default();
     let name = program.to_string_lossy().into_owned();
-    // A path is the caller's; a bare name is looked for on the PATH.
+    // A path is relative to the caller's folder; a bare name is searched on the PATH.
     let program = match Path::new(&program) {
         path if path.components().count() > 1 => {
             path.canonicalize().unwrap_or_else(|_| path.into())
@@ -311,7 +311,7 @@ fn start(driver: &Driver, command: &[OsString]) -> Result<(), Error> {
         .env("VK_DRIVER_FILES", &driver.manifest)
         .env("VK_ICD_FILENAMES", &driver.manifest)
         .env_remove("VK_ADD_DRIVER_FILES")
-        // What it prints is not this command's output.
+        // The program's output is not this command's output.
         .stdout(process::Stdio::from(std::io::stderr()));
     if !words.iter().any(has_placeholder) {
         process.current_dir(&driver.folder);
@@ -330,12 +330,13 @@ fn start(driver: &Driver, command: &[OsString]) -> Result<(), Error> {
     Ok(())
 }
 
-/// Compares two pictures of a size, and makes a picture of their differences, the largest being white.
+/// Compares two pictures of the same size, and makes a picture of their differences, scaled so that the largest is
+/// white.
 fn compare_pictures(name: &str, [a, b]: &[Picture; 2]) -> (Compared, Picture) {
     let (width, height) = (a.width as usize, a.height as usize);
     let apart = |a: [f32; 4], b: [f32; 4]| {
         let channel = |c: usize| match (a[c], b[c]) {
-            // Equal, infinities too.
+            // Equal values, also infinities.
             (a, b) if a.to_bits() == b.to_bits() => 0.0,
             (a, b) if a.is_nan() && b.is_nan() => 0.0,
             (a, b) if a.is_nan() || b.is_nan() => f32::INFINITY,
@@ -396,7 +397,7 @@ fn write_picture(path: &Path, picture: &Picture) -> Result<(), Error> {
     Ok(gaurast_picture::write(path, picture, Some([0.0; 3]))?)
 }
 
-/// The sentence that a person reads of a picture.
+/// The sentence about a picture for people.
 fn sentence(one: &Compared) -> String {
     if one.equal {
         return "equal".to_owned();
@@ -492,7 +493,7 @@ mod tests {
         let a = picture(square);
         let same = compare_pictures("same", &[a.clone(), a.clone()]).0;
         assert!(same.equal && same.psnr.is_none() && same.largest == 0.0);
-        // One pixel of the square's border, one of its inside, by a step.
+        // One pixel of the square's border and one of its inside differ by a step.
         let b = picture(|x, y| match (x, y) {
             (4, 4) => 0.0,
             (8, 8) => 254.0 / 255.0,

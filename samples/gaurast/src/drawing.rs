@@ -1,4 +1,4 @@
-//! One device, one scene, many views: draws them one after the other while those before are written.
+//! Draws many views of one scene on one device. A picture is written while the next one is drawn.
 
 use std::sync::mpsc::sync_channel;
 use std::time::Duration;
@@ -13,7 +13,7 @@ use crate::limits;
 use crate::outputs::{Finished, Outputs, WriteError};
 use crate::progress::Progress;
 
-/// Why there are no pictures. Displayed as one sentence.
+/// A failure of drawing. Displayed as one sentence.
 #[derive(Debug, Error)]
 pub enum DrawError {
     #[error(transparent)]
@@ -26,7 +26,7 @@ pub enum DrawError {
     Nothing(String),
 }
 
-/// The settings that the command line and the scene's file ask for.
+/// The settings from the command line and the scene's file.
 pub fn settings(modes: &ModeArguments, scene: &Scene) -> Settings {
     let surfels = match modes.geometry {
         Geometry::Auto => scene.geometry() == gaurast_scene::Geometry::Surfel,
@@ -66,17 +66,17 @@ pub fn settings(modes: &ModeArguments, scene: &Scene) -> Settings {
     }
 }
 
-/// What the scene's file says that Gaussians are sorted by.
+/// The sort order in the scene's file.
 fn metadata_order(scene: &Scene) -> SortOrder {
     scene.metadata().order.unwrap_or_default()
 }
 
-/// Tells if the scene's file says that its colours are linear light.
+/// Returns true if the colours in the scene's file are linear light.
 pub fn has_linear_colors(scene: &Scene) -> bool {
     scene.metadata().color_space == Some(gaurast_scene::ColorSpace::LinearRec709Display)
 }
 
-/// What a person should know of how the scene's file is heeded, a sentence each.
+/// Notes for the user about settings in the scene's file, a sentence each.
 pub fn notes(modes: &ModeArguments, scene: &Scene) -> Vec<String> {
     let metadata = scene.metadata();
     let mut notes = metadata.notes.clone();
@@ -109,21 +109,21 @@ pub struct Drawing {
     scene: gaurast_render::DeviceScene,
 }
 
-/// What became of a view.
+/// The result of drawing a view.
 pub struct Drawn {
-    /// Among all views.
+    /// The index among all views.
     pub index: usize,
     pub time: Duration,
     pub counters: Vec<gaurast_render::Counter>,
-    /// Why there is nothing in the picture, if so.
+    /// The reason for which the picture is empty, if it is.
     pub nothing: Option<String>,
 }
 
 impl Drawing {
-    /// Puts `scene` on a device, to be drawn by `settings`.
+    /// Creates a device for `scene` and `settings`.
     ///
     /// # Errors
-    /// If there is no device, no room, or more threads are asked for than help.
+    /// If there is no device, not enough memory, or too many threads are requested.
     pub fn new(scene: &Scene, settings: Settings, counters: bool) -> Result<Self, DrawError> {
         limits::check_threads().map_err(DrawError::Limit)?;
         let mut renderer = Renderer::new(vulkan_gaurast::entry())?;
@@ -146,10 +146,10 @@ impl Drawing {
         Ok(self.renderer.render(&self.scene, &view.camera)?)
     }
 
-    /// Draws the views of these indices and writes them; a picture with nothing in it is an error if `strict`.
+    /// Draws the views with these indices and writes them. An empty picture is an error if `strict`.
     ///
     /// # Errors
-    /// The first that there is; pictures that were drawn before it are written.
+    /// The first error. The pictures before it are written.
     pub fn all(
         &mut self,
         views: &[View],
@@ -166,7 +166,7 @@ impl Drawing {
         let bar = progress.pictures(indices.len() as u64);
         let mut drawn = Vec::new();
         std::thread::scope(|scope| {
-            // Nothing waits in between: one picture is written while the next is drawn.
+            // The channel has no buffer: one picture is written while the next one is drawn.
             let (send, receive) = sync_channel::<Finished<'_>>(0);
             let writing = scope.spawn(move || {
                 for finished in receive {
@@ -207,7 +207,7 @@ impl Drawing {
                     picture,
                     depth,
                 };
-                // The writer tells why it is gone.
+                // The writer reports the error that ended it.
                 if send.send(finished).is_err() {
                     break;
                 }
@@ -225,7 +225,7 @@ impl Drawing {
     }
 }
 
-/// Why the picture has nothing in it, if so: what became of the Gaussians, counted.
+/// The reason for which the picture is empty, if it is, with counts of the skipped Gaussians.
 fn reasons(frame: &Frame, view: &View) -> Option<String> {
     if frame.picture.pixels.iter().any(|pixel| pixel[3] > 0.0) {
         return None;

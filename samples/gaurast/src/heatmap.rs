@@ -1,7 +1,7 @@
-//! How many Gaussians contribute to a pixel, as a picture.
+//! A picture of the number of Gaussians that contribute to each pixel.
 //!
-//! The numbers are what the device did, by its trace of work (`GAURAST_TRACE`): it tells of tiles, so that a tile has one
-//! colour, that of its pixels' mean.
+//! The numbers come from the device's trace of work (`GAURAST_TRACE`). The trace has one number per tile, so a tile has
+//! one colour, that of its pixels' mean.
 
 use std::path::{Path, PathBuf};
 
@@ -11,10 +11,10 @@ use tempfile::TempDir;
 use thiserror::Error;
 use timing::work::{TILE_SIDE, Trace};
 
-/// The variable that makes the device leave a trace.
+/// The variable that makes the device write a trace.
 const TRACE: &str = "GAURAST_TRACE";
 
-/// Why there is no picture of the counts. Displayed as one sentence.
+/// A failure to make the picture of the counts. Displayed as one sentence.
 #[derive(Debug, Error)]
 pub enum HeatmapError {
     #[error("{}: {source}", path.display())]
@@ -30,8 +30,8 @@ pub enum HeatmapError {
     Output(#[from] OutputError),
 }
 
-/// Makes devices leave their traces in a file from now on, unless the environment has them leave one already. The
-/// folder, if there is one, must live as long as the trace is wanted.
+/// Makes devices write their traces to a file from now on, unless the environment requests a trace already. The
+/// returned folder, if there is one, must exist until the trace is read.
 pub fn trace_from_now_on() -> std::io::Result<Option<TempDir>> {
     if std::env::var_os(TRACE).is_some_and(|file| !file.is_empty()) {
         return Ok(None);
@@ -42,7 +42,8 @@ pub fn trace_from_now_on() -> std::io::Result<Option<TempDir>> {
     Ok(Some(folder))
 }
 
-/// Writes the picture of the last frame that the device drew, once the device is gone; returns the greatest count.
+/// Writes the picture of the last frame that the device drew, after the device is destroyed; returns the greatest
+/// count.
 ///
 /// # Errors
 /// See [`HeatmapError`].
@@ -70,7 +71,7 @@ pub fn write(path: &Path, camera: &Camera, force: bool) -> Result<f64, HeatmapEr
     Ok(greatest)
 }
 
-/// The picture of contributions by tile (column and row), and the greatest mean.
+/// The picture of the contributions by tile (column and row), and the greatest mean.
 fn picture(
     [width, height]: [u32; 2],
     tiles: impl Iterator<Item = ([u32; 2], u64)>,
@@ -105,7 +106,7 @@ fn picture(
     (picture, greatest)
 }
 
-/// The colour of a part, 0 to 1: black, blue, red, yellow, white, each brighter than the one before.
+/// The colour of a value from 0 to 1: black, blue, red, yellow, white, with increasing brightness.
 pub fn heat(part: f32) -> [f32; 3] {
     const COLORS: [[f32; 3]; 5] = [
         [0.0, 0.0, 0.0],

@@ -1,4 +1,4 @@
-//! `gaurast info`: what a scene holds.
+//! `gaurast info`: the contents of a scene.
 
 use std::io::Write;
 
@@ -13,10 +13,10 @@ use crate::progress::Progress;
 use crate::report::{grouped, write_json};
 use crate::sources::{Source, SourceError};
 
-/// Characters of the longest bar.
+/// The number of characters of the longest bar.
 const BAR: usize = 40;
 
-/// Why nothing is told. Displayed as one sentence.
+/// A failure to read the scene. Displayed as one sentence.
 #[derive(Debug, Error)]
 pub enum Error {
     #[error(transparent)]
@@ -36,7 +36,7 @@ pub struct InfoArguments {
     pub json: bool,
 }
 
-/// Reads the scene and tells.
+/// Reads the scene and prints its contents.
 pub fn run(arguments: &InfoArguments) -> Result<(), Error> {
     let source = Source::of(&arguments.scene)?;
     let progress = Progress {
@@ -126,7 +126,7 @@ fn text(info: &Info, extent: &Extent) -> String {
     text
 }
 
-/// A line for each bar, but for empty ones at both ends.
+/// A line for each bar, without the empty ones at both ends.
 fn histogram(title: &str, bars: &[Bar]) -> String {
     let greatest = bars.iter().map(|bar| bar.count).max().unwrap_or(0).max(1);
     let first = bars.iter().position(|bar| bar.count > 0).unwrap_or(0);

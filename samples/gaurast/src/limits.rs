@@ -1,16 +1,16 @@
-//! What is refused before memory and time are spent on it.
+//! Checks of requests that would take too much memory or time.
 
 use std::fs;
 
 use gaurast_scene::Camera;
 
-/// Threads that a device may have in any case; above it, four for each processor.
+/// The number of threads that a device may always have; beyond it, four for each processor are allowed.
 const THREADS: usize = 64;
 
-/// Checks that `GAURAST_THREADS` asks for no more threads than help: each costs a start.
+/// Checks that `GAURAST_THREADS` is not larger than useful, since each thread costs time to start.
 ///
 /// # Errors
-/// A sentence.
+/// A sentence about the limit.
 pub fn check_threads() -> Result<(), String> {
     let Some(wanted) = std::env::var("GAURAST_THREADS")
         .ok()
@@ -28,10 +28,10 @@ pub fn check_threads() -> Result<(), String> {
     Ok(())
 }
 
-/// Checks that there is memory for pictures of this camera's size: the device's, the host's, and a file's.
+/// Checks that there is memory for pictures of this camera's size: on the device, on the host, and for the file.
 ///
 /// # Errors
-/// A sentence.
+/// A sentence about the limit.
 pub fn check_memory(
     camera: &Camera,
     depth: bool,
@@ -42,7 +42,7 @@ pub fn check_memory(
         return Ok(());
     };
     let pixel = 16 + if depth { 8 } else { 0 };
-    // The attachment, what the host reads it from, and pictures: one that is drawn, one that is written.
+    // The attachment, the buffer that the host reads, and pictures: one is drawn while another is written.
     let pictures = if views > 1 { 2 } else { 1 };
     let needed =
         u64::from(camera.width) * u64::from(camera.height) * ((2 + pictures) * pixel + encoding);
@@ -59,7 +59,8 @@ pub fn check_memory(
     Ok(())
 }
 
-/// Bytes of memory that are free, as far as Linux tells: the machine's, or less where the process's group may use less.
+/// The available memory in bytes, as far as Linux reports it: the machine's, or less if the process's control group is
+/// limited.
 fn available_memory() -> Option<u64> {
     let text = fs::read_to_string("/proc/meminfo").ok()?;
     let line = text

@@ -1,11 +1,11 @@
-//! What the driver logs: each message once, and errors in the sentence that the command ends with.
+//! A logger that prints each message of the driver once. Errors become a part of the command's last sentence.
 
 use std::collections::HashSet;
 use std::sync::{Mutex, PoisonError};
 
 use log::{Level, LevelFilter, Log, Metadata, Record};
 
-/// What was logged so far.
+/// The messages logged so far.
 static LOGGED: Mutex<Logged> = Mutex::new(Logged {
     errors: Vec::new(),
     seen: None,
@@ -13,29 +13,29 @@ static LOGGED: Mutex<Logged> = Mutex::new(Logged {
 
 struct Logged {
     errors: Vec<String>,
-    /// Messages that were printed.
+    /// Messages that were printed already.
     seen: Option<HashSet<String>>,
 }
 
 struct Logger {
     inner: env_logger::Logger,
-    /// `RUST_LOG` is set: errors are printed as they come, too.
+    /// True if `RUST_LOG` is set: errors are then also printed immediately.
     asked_for: bool,
 }
 
-/// Logs warnings, or what `RUST_LOG` says, to stderr from now on.
+/// Logs warnings, or the levels of `RUST_LOG`, to stderr from now on.
 pub fn start() {
     let variable = env_logger::Env::default().default_filter_or("warn");
     let inner = env_logger::Builder::from_env(variable).build();
     let level = inner.filter().max(LevelFilter::Error);
     let asked_for = std::env::var_os("RUST_LOG").is_some();
-    // Nothing else sets a logger.
+    // No other code sets a logger.
     if log::set_boxed_logger(Box::new(Logger { inner, asked_for })).is_ok() {
         log::set_max_level(level);
     }
 }
 
-/// The last error that was logged, without what tells programs of its kind.
+/// The last error that was logged, without the parts that are meant for programs.
 pub fn last_error() -> Option<String> {
     let logged = LOGGED.lock().unwrap_or_else(PoisonError::into_inner);
     logged
@@ -44,7 +44,7 @@ pub fn last_error() -> Option<String> {
         .map(|message| plain(message).to_owned())
 }
 
-/// A message without the kind in brackets after it, and without the call before it.
+/// A message without the kind in brackets at its end and without the call at its beginning.
 fn plain(message: &str) -> &str {
     let message = match message.rsplit_once(" [") {
         Some((message, kind)) if kind.ends_with(']') => message,
@@ -71,7 +71,7 @@ impl Log for Logger {
             let seen = logged.seen.get_or_insert_with(HashSet::new);
             seen.insert(message)
         };
-        // An error is told at the end.
+        // An error is printed at the end.
         if new && (self.asked_for || record.level() != Level::Error) {
             self.inner.log(record);
         }

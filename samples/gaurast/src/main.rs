@@ -1,4 +1,4 @@
-//! `gaurast`: pictures of 3D Gaussian scenes, headless, on a simulated Gaussian rasterizer.
+//! `gaurast`: a command that draws pictures of 3D Gaussian scenes on a simulated Gaussian rasterizer, without a window.
 
 mod args;
 mod cameras;
@@ -24,20 +24,20 @@ use std::process::ExitCode;
 
 use command_line::{Arguments, Command};
 
-/// Why the command failed: a sentence, and the exit code.
+/// A failure of the command: a sentence, and the exit code.
 struct Failure {
     sentence: String,
     code: u8,
 }
 
-/// The exit code of what failed.
+/// The exit code of a failure.
 const FAILED: u8 = 1;
 
-/// The exit code of a command line that means nothing, as clap's.
+/// The exit code of an invalid command line, as clap's.
 const MISUSE: u8 = 2;
 
 fn main() -> ExitCode {
-    // A file that grows beyond the process's limit is an error like a full disk, and no signal.
+    // A write beyond the process's file size limit must be an error, as with a full disk, and not a signal.
     #[cfg(unix)]
     // SAFETY: no other thread runs yet, and ignoring a signal runs no code of ours.
     unsafe {
@@ -46,7 +46,7 @@ fn main() -> ExitCode {
     logger::start();
     let arguments = Arguments::read();
     let result = run(arguments.command.unwrap_or_default());
-    // What the driver found wrong, such as a trace that does not fit the disk, has no result of its own.
+    // Some errors of the driver have no result, such as a trace that does not fit on the disk.
     let logged = logger::last_error();
     let failure = match (result, logged) {
         (Ok(()), None) => return ExitCode::SUCCESS,
@@ -54,7 +54,7 @@ fn main() -> ExitCode {
             sentence,
             code: FAILED,
         },
-        // The driver's message says more than the name of a call and its result.
+        // The driver's message has more information than the name of a call and its result.
         (Err(failure), Some(sentence)) if failure.sentence.starts_with("vk") => Failure {
             sentence,
             ..failure

@@ -1,4 +1,4 @@
-//! Where pictures go: files, numbered files, folders, videos, standard output.
+//! Destinations of pictures: files, numbered files, folders, videos, standard output.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -11,7 +11,7 @@ use crate::args::OutputArguments;
 use crate::cameras::View;
 use crate::sources::stem;
 
-/// Extensions of videos, and what ffmpeg is told for them.
+/// File extensions of videos, and ffmpeg's arguments for them.
 const VIDEOS: [(&str, &[&str]); 4] = [
     (
         "mp4",
@@ -22,7 +22,7 @@ const VIDEOS: [(&str, &[&str]); 4] = [
     ("webm", &["-c:v", "libvpx-vp9", "-crf", "24", "-b:v", "0"]),
 ];
 
-/// Why pictures cannot be written. Displayed as one sentence.
+/// A failure to write pictures. Displayed as one sentence.
 #[derive(Debug, Error)]
 pub enum WriteError {
     #[error(transparent)]
@@ -58,18 +58,18 @@ pub enum WriteError {
     Stdout(std::io::Error),
 }
 
-/// One place that pictures go to.
+/// A destination of pictures.
 #[derive(Clone, Debug, PartialEq)]
 enum Place {
-    /// One picture.
+    /// A file for one picture.
     File(PathBuf),
-    /// The number of the view between two texts, with so many digits at least.
+    /// A pattern: the number of the view, with a minimum number of digits, between two texts.
     Numbered {
         before: String,
         digits: usize,
         after: String,
     },
-    /// PNG files named after the views.
+    /// A folder for PNG files named after the views.
     Folder(PathBuf),
     Video(PathBuf),
     Stdout,
@@ -136,7 +136,7 @@ fn video_options(path: &Path) -> Option<&'static [&'static str]> {
     video.map(|(_, options)| *options)
 }
 
-/// What is written, checked before anything is drawn.
+/// The destinations of all pictures, checked before anything is drawn.
 pub struct Outputs {
     places: Vec<Place>,
     background: Option<Background>,
@@ -150,7 +150,7 @@ pub struct Outputs {
 /// The encoder and its input.
 struct Video {
     path: PathBuf,
-    /// What ffmpeg writes; it becomes `path` when all is written.
+    /// The file that ffmpeg writes; it is renamed to `path` when it is complete.
     temporary: PathBuf,
     child: Child,
     input: ChildStdin,
@@ -162,7 +162,7 @@ pub struct Writer<'a> {
     videos: Vec<Video>,
 }
 
-/// A picture that waits to be written.
+/// A picture that is ready to be written.
 pub struct Finished<'a> {
     pub index: usize,
     pub view: &'a View,
@@ -171,10 +171,10 @@ pub struct Finished<'a> {
 }
 
 impl Outputs {
-    /// The outputs that are asked for, or `default`; nothing is written yet.
+    /// The destinations in `arguments`, or `default`; nothing is written yet.
     ///
     /// # Errors
-    /// What can be known before there are pictures.
+    /// Errors that can be found before there are pictures.
     pub fn new(
         arguments: &OutputArguments,
         default: &str,
@@ -232,18 +232,18 @@ impl Outputs {
         Ok(outputs)
     }
 
-    /// The outputs of pictures of a scene with such colours.
+    /// The same destinations for a scene whose colours are linear or not.
     pub fn with_colors(self, linear: bool) -> Self {
         let colors = if linear { Colors::Linear } else { Colors::Srgb };
         Self { colors, ..self }
     }
 
-    /// Tells if standard output is taken by pictures.
+    /// Returns true if pictures are written to standard output.
     pub fn use_stdout(&self) -> bool {
         self.places.contains(&Place::Stdout)
     }
 
-    /// Bytes for each pixel that encoding takes, at most.
+    /// The greatest number of bytes per pixel that encoding needs.
     pub fn bytes_per_pixel(&self) -> u64 {
         let bytes = |place: &Place| match place {
             Place::File(path) => PictureFormat::of(path).map_or(8, PictureFormat::bytes_per_pixel),
@@ -255,11 +255,11 @@ impl Outputs {
         self.places.iter().map(bytes).max().unwrap_or(8)
     }
 
-    /// Those of `wanted`, indices of `views`, that are to be drawn: with `resume`, the ones that lack a file. Without
-    /// `force` and `resume`, there may be none of their files.
+    /// The views in `wanted`, indices of `views`, that must be drawn. With `resume`, these are the views without a
+    /// file. Without `force` and `resume`, none of their files may exist.
     ///
     /// # Errors
-    /// If views don't fit the places, or a file is there.
+    /// If the number of views does not fit the destinations, or a file exists.
     pub fn missing(
         &self,
         views: &[View],
@@ -318,7 +318,7 @@ impl Outputs {
         places.filter_map(|place| place.file(index, view)).collect()
     }
 
-    /// Where the views of the first and the last index go, for people.
+    /// The destinations of the first and the last view, for people.
     pub fn told(&self, first: (usize, &View), last: (usize, &View)) -> String {
         let told = |place: &Place| match place {
             Place::Stdout => "standard output".to_owned(),
@@ -339,7 +339,7 @@ impl Outputs {
         self.places.iter().map(told).collect::<Vec<_>>().join(", ")
     }
 
-    /// A writer; folders are made and encoders started for frames of `size`.
+    /// Creates a writer: creates folders and starts encoders for frames of `size`.
     ///
     /// # Errors
     /// If that fails.
@@ -365,7 +365,7 @@ impl Outputs {
 }
 
 impl Writer<'_> {
-    /// Writes a picture to all places.
+    /// Writes a picture to all destinations.
     ///
     /// # Errors
     /// If one fails.
@@ -394,7 +394,7 @@ impl Writer<'_> {
         if !self.videos.is_empty() {
             let bytes = gaurast_picture::rgb(&finished.picture, &encoding);
             for video in &mut self.videos {
-                // What ffmpeg says of it comes at the end.
+                // ffmpeg's message about the error is reported at the end.
                 if video.input.write_all(&bytes).is_err() {
                     break;
                 }
@@ -403,7 +403,7 @@ impl Writer<'_> {
         Ok(())
     }
 
-    /// Ends the videos.
+    /// Completes the videos.
     ///
     /// # Errors
     /// If an encoder failed.
@@ -434,7 +434,7 @@ impl Video {
                 "-nostdin", "-v", "error", "-f", "rawvideo", "-pix_fmt", "rgb24",
             ])
             .args(["-s", &format!("{width}x{height}"), "-r", &fps.to_string()])
-            // Colours at half the size need even sides.
+            // Chroma has half the resolution, so the sides must be even.
             .args([
                 "-i",
                 "pipe:0",
@@ -465,7 +465,7 @@ impl Video {
     fn finish(self) -> Result<(), WriteError> {
         drop(self.input);
         let failed = |reason: String| {
-            // It may not be there.
+            // The file may not exist.
             let _ = std::fs::remove_file(&self.temporary);
             WriteError::Ffmpeg {
                 path: self.path.clone(),

@@ -1,4 +1,4 @@
-//! Progress of long steps, on a terminal only.
+//! Progress of long steps, shown only on a terminal.
 
 use std::time::Duration;
 
@@ -20,7 +20,7 @@ impl Progress {
         )
     }
 
-    /// A bar of `count` pictures, with the time that the others will take.
+    /// A bar of `count` pictures, with the estimated remaining time.
     pub fn pictures(self, count: u64) -> ProgressBar {
         if count == 1 {
             return self.step("drawing");

@@ -17,7 +17,7 @@ use crate::progress::Progress;
 use crate::report::{self, Summary};
 use crate::sources::{Source, SourceError};
 
-/// Why there is no picture. Displayed as one sentence.
+/// A failure of the command. Displayed as one sentence.
 #[derive(Debug, Error)]
 pub enum Error {
     #[error(transparent)]
@@ -41,7 +41,7 @@ pub enum Error {
 }
 
 impl Error {
-    /// Tells if the command line means nothing.
+    /// Returns true if the command line is invalid.
     pub fn is_misuse(&self) -> bool {
         matches!(self, Self::View(error) if error.is_misuse())
     }
@@ -54,7 +54,7 @@ pub fn run(arguments: &RenderArguments) -> Result<(), Error> {
     if let Some(path) = &arguments.output.heatmap {
         gaurast_picture::check(path)?;
     }
-    // A camera file is read first: its mistakes should not wait for a large scene.
+    // The camera file is read first, so that its errors are reported before a large scene is read.
     let known = cameras::read(&arguments.camera, &source)?;
     let quiet = arguments.report.quiet;
     let progress = Progress { quiet };
@@ -150,7 +150,7 @@ pub fn run(arguments: &RenderArguments) -> Result<(), Error> {
             print_json(&value).map_err(Error::Report)
         };
     }
-    // Whoever reads this may have gone, and scripts should know; the pictures are there all the same.
+    // The reader of standard output may have gone. Scripts should get an error, although the pictures are written.
     let text = summary.text();
     if outputs.use_stdout() {
         eprint!("{text}");
@@ -162,7 +162,7 @@ pub fn run(arguments: &RenderArguments) -> Result<(), Error> {
         .map_err(Error::Report)
 }
 
-/// The indices of the views of this process's share.
+/// The indices of the views in this process's share.
 fn views_of_shard(views: &[View], arguments: &RenderArguments) -> Vec<usize> {
     let of_share = |index: &usize| {
         let shard = arguments.output.shard;
@@ -171,7 +171,7 @@ fn views_of_shard(views: &[View], arguments: &RenderArguments) -> Vec<usize> {
     (0..views.len()).filter(of_share).collect()
 }
 
-/// The indices of the views that are to be drawn.
+/// The indices of the views that must be drawn.
 fn chosen(
     views: &[View],
     arguments: &RenderArguments,
@@ -181,7 +181,7 @@ fn chosen(
     outputs.missing(views, wanted, &arguments.output)
 }
 
-/// Prints a list for `--path`, a line for each.
+/// Prints a list for `--path`, one line per view.
 fn print_keyframes(keyframes: &[Keyframe]) -> std::io::Result<()> {
     let lines = keyframes.iter().map(serde_json::to_string);
     let lines = lines.collect::<Result<Vec<_>, _>>()?.join(",\n ");
@@ -190,7 +190,7 @@ fn print_keyframes(keyframes: &[Keyframe]) -> std::io::Result<()> {
     stdout.flush()
 }
 
-/// Prints a value for programs.
+/// Prints a value as JSON.
 fn print_json(value: &impl serde::Serialize) -> std::io::Result<()> {
     let mut stdout = stdout().lock();
     report::write_json(&mut stdout, value)?;

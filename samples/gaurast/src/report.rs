@@ -1,4 +1,4 @@
-//! What a rendering did: a line, a table of what the device counted, or JSON.
+//! The report of a rendering: a line, a table of the device's counters, or JSON.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -15,25 +15,25 @@ use crate::cameras::View;
 use crate::drawing::Drawn;
 use crate::outputs::Outputs;
 
-/// What a rendering did.
+/// The results of a rendering.
 pub struct Summary<'a> {
     pub scene: &'a Scene,
     /// The scene's files; the garden if there is none.
     pub files: &'a [PathBuf],
     pub loading: Duration,
-    /// Drawing and writing.
+    /// The time of drawing and writing.
     pub drawing: Duration,
     pub views: &'a [View],
     pub drawn: &'a [Drawn],
-    /// Views whose files were there.
+    /// The number of views whose files existed.
     pub kept: usize,
     pub outputs: &'a Outputs,
-    /// How to have the view again.
+    /// The options that give the same view again.
     pub framing: Option<&'a str>,
     pub notes: &'a [String],
-    /// The picture of the counts, and the greatest.
+    /// The file of the picture of the counts, and the greatest count.
     pub heatmap: Option<(&'a Path, f64)>,
-    /// Tables are wanted.
+    /// True if tables are requested.
     pub stats: bool,
 }
 
@@ -60,7 +60,7 @@ impl Summary<'_> {
         text
     }
 
-    /// What was written, where, in which time.
+    /// A line with the written files and the time.
     fn line(&self) -> String {
         let kept = match self.kept {
             0 => String::new(),
@@ -92,7 +92,7 @@ impl Summary<'_> {
         )
     }
 
-    /// The table of a view: what the host knows, then what the device counted, in its groups.
+    /// The table of a view: the host's values, then the device's counters in their groups.
     fn table(&self, drawn: &Drawn) -> Table {
         let mut table = Table::new();
         table.load_style(UTF8_FULL_CONDENSED);
@@ -100,7 +100,7 @@ impl Summary<'_> {
             let mut last = String::new();
             let table = &mut table;
             move |group: &str, name: &str, value: String| {
-                // A group's name stands in its first row.
+                // A group's name is in its first row.
                 let shown = if group == last { "" } else { group };
                 table.add_row([shown, name, &value]);
                 group.clone_into(&mut last);
@@ -125,7 +125,7 @@ impl Summary<'_> {
         table
     }
 
-    /// Everything, for programs.
+    /// The whole report as JSON.
     pub fn json(&self) -> serde_json::Value {
         let milliseconds = |time: Duration| time.as_secs_f64() * 1e3;
         let pictures: Vec<_> = (self.drawn.iter())
@@ -169,7 +169,7 @@ impl Summary<'_> {
     }
 }
 
-/// Writes a value for programs: indented, with a line's end.
+/// Writes a value as indented JSON with a final newline.
 pub fn write_json(writer: &mut dyn Write, value: &impl serde::Serialize) -> std::io::Result<()> {
     let text = serde_json::to_string_pretty(value)?;
     writeln!(writer, "{text}")
@@ -206,7 +206,7 @@ fn milliseconds(value: f64) -> String {
     format!("{value:.2} ms")
 }
 
-/// A whole number with a space between groups of three digits.
+/// An integer with a space between groups of three digits.
 pub fn grouped(value: f64) -> String {
     let digits = format!("{:.0}", value.abs());
     let mut text = String::new();

@@ -18,10 +18,10 @@ use crate::sources::{Source, SourceError};
 /// The azimuths of the sheet, in rows.
 const AZIMUTHS: [[u16; 4]; 2] = [[0, 45, 90, 135], [180, 225, 270, 315]];
 
-/// The size of one view where none is given.
+/// The default size of one view.
 const CELL: [u32; 2] = [480, 360];
 
-/// Why there is no sheet. Displayed as one sentence.
+/// A failure to make the sheet. Displayed as one sentence.
 #[derive(Debug, Error)]
 pub enum Error {
     #[error(transparent)]
@@ -43,7 +43,7 @@ pub struct ViewsArguments {
     #[command(flatten)]
     pub scene: SceneArguments,
 
-    /// The direction that is upwards in the scene [default: 0,-1,0]
+    /// The upward direction of the scene [default: 0,-1,0]
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub up: Option<Triple>,
 
@@ -55,18 +55,18 @@ pub struct ViewsArguments {
     #[arg(long, value_name = "WxH")]
     pub size: Option<Size>,
 
-    /// What is behind the scene: a name, #rgb, #rrggbb, or R,G,B, each 0 to 1
+    /// The background of the scene: a name, #rgb, #rrggbb, or R,G,B, each 0 to 1
     #[arg(long, value_name = "COLOUR")]
     pub background: Option<Background>,
 
     #[command(flatten)]
     pub modes: ModeArguments,
 
-    /// Where the sheet goes [default: the scene's name with -views.png]
+    /// The file for the sheet [default: the scene's name with -views.png]
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
 
-    /// Replace a file that is there
+    /// Replace an existing file
     #[arg(long)]
     pub force: bool,
 
@@ -138,13 +138,13 @@ pub fn run(arguments: &ViewsArguments) -> Result<(), Error> {
     Ok(())
 }
 
-/// Pictures of one size beside and below each other.
+/// Pictures of one size in rows.
 struct Sheet {
     cell: [u32; 2],
     picture: Picture,
 }
 
-/// Pixels along a side of a glyph's dot.
+/// The size in pixels of a dot of a letter.
 const DOT: u32 = 2;
 
 impl Sheet {
@@ -170,7 +170,7 @@ impl Sheet {
         }
     }
 
-    /// Writes a text in the upper left corner of a cell, white on black, as far as it fits.
+    /// Writes a text in the upper left corner of a cell, white on black, and cuts it off at the cell's edge.
     fn label(&mut self, cell: [u32; 2], text: &str) {
         let [left, top] = [cell[0] * self.cell[0], cell[1] * self.cell[1]];
         let size = [6 * DOT * text.len() as u32 + DOT, 9 * DOT];

@@ -1,7 +1,7 @@
-//! `gaurast simulate`: what the simulated hardware would have spent on a scene.
+//! `gaurast simulate`: the estimated cost of a scene on the simulated hardware.
 //!
-//! The work is what the device really did: this program draws the scene once more in a process of its own, with
-//! `GAURAST_TRACE` set, as one would with any other Vulkan program.
+//! The work is that of a real run. This program draws the scene in a process of its own with `GAURAST_TRACE` set, which
+//! works with any Vulkan program.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -23,7 +23,7 @@ use timing_studies::{area, paper, rtl, stepped};
 use crate::simulate_plot as plot;
 use crate::simulate_report as report;
 
-/// Why there is no simulation. Displayed as one sentence.
+/// A failure of the simulation. Displayed as one sentence.
 #[derive(Debug, Error)]
 pub enum Error {
     #[error(transparent)]
@@ -60,7 +60,7 @@ pub enum Error {
     Json(#[from] serde_json::Error),
 }
 
-/// How results are printed.
+/// The format of results.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum Format {
     /// Tables for people
@@ -68,7 +68,7 @@ pub enum Format {
     Table,
     /// Everything, as JSON
     Json,
-    /// The main numbers, a line for each machine
+    /// The main numbers, one line per machine
     Csv,
 }
 
@@ -85,60 +85,60 @@ pub struct SimulateArguments {
     #[arg(long, value_name = "FILE.toml", conflicts_with = "preset")]
     pub config: Option<PathBuf>,
 
-    /// Changes the hardware, as in modules=30 or memory.efficiency=0.8; may be given more than once
+    /// Change a parameter of the hardware, as in modules=30 or memory.efficiency=0.8; may be given more than once
     #[arg(long = "set", value_name = "NAME=VALUE")]
     pub settings: Vec<String>,
 
-    /// Simulates one machine after the other, as in modules=1..32 or saturation=none,tile,block; given more than once, every
-    /// combination
+    /// Simulate one machine after the other, as in modules=1..32 or saturation=none,tile,block; if given more than
+    /// once, every combination
     #[arg(long, value_name = "NAME=FIRST..LAST")]
     pub sweep: Vec<String>,
 
-    /// Plots the sweep's speed-ups and energy
+    /// Plot the sweep's speed-ups and energy
     #[arg(long, value_name = "FILE.svg", requires = "sweep")]
     pub plot: Option<PathBuf>,
 
-    /// Plots each machine's raster time over its area, with the front of those that no other beats
+    /// Plot each machine's raster time against its area, with the Pareto front
     #[arg(long, value_name = "FILE.svg", requires = "sweep")]
     pub pareto: Option<PathBuf>,
 
-    /// Plots the stages under the roofs of shader cores and rasterizer
+    /// Plot the stages under the rooflines of shader cores and rasterizer
     #[arg(long, value_name = "FILE.svg")]
     pub roofline: Option<PathBuf>,
 
-    /// Draws the frame's tiles, coloured by the cycles that they take
+    /// Draw the frame's tiles, coloured by their cycles
     #[arg(long, value_name = "FILE.svg")]
     pub tiles: Option<PathBuf>,
 
-    /// Simulates every frame of the trace, not the last one alone
+    /// Simulate every frame of the trace, not only the last one
     #[arg(long, conflicts_with_all = ["sweep", "what_if", "stepped"])]
     pub every_frame: bool,
 
-    /// Writes the rasterizer module in SystemVerilog, and nothing else
+    /// Write the rasterizer module in SystemVerilog, and nothing else
     #[arg(long, value_name = "DIR", conflicts_with_all = ["scene", "sweep", "what_if", "trace", "stepped", "paper"])]
     pub emit_rtl: Option<PathBuf>,
 
-    /// Shows what each skip would bring as hardware
+    /// Show the saving of each skip as hardware
     #[arg(long, conflicts_with = "sweep")]
     pub what_if: bool,
 
-    /// Writes a timeline that chrome://tracing and Perfetto show
+    /// Write a timeline for chrome://tracing and Perfetto
     #[arg(long, value_name = "FILE.json")]
     pub trace: Option<PathBuf>,
 
-    /// Frames of the timeline
+    /// The number of frames of the timeline
     #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u16).range(1..))]
     pub frames: u16,
 
-    /// Steps the rasterizer clock by clock, too, and tells how far the fast model is off
+    /// Also step the rasterizer clock by clock, and print the error of the fast model
     #[arg(long, conflicts_with_all = ["sweep", "what_if"])]
     pub stepped: bool,
 
-    /// Prints the paper's numbers beside the model's, and nothing else
+    /// Print the paper's numbers and the model's, and nothing else
     #[arg(long, conflicts_with_all = ["scene", "sweep", "what_if", "trace", "stepped"])]
     pub paper: bool,
 
-    /// How results are printed
+    /// The format of results
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,
 
@@ -146,7 +146,7 @@ pub struct SimulateArguments {
     #[arg(long, value_name = "FILE")]
     pub cameras: Option<PathBuf>,
 
-    /// Which camera of the file, from 0
+    /// The camera's index in the file, from 0
     #[arg(long, value_name = "N", requires = "cameras", default_value_t = 0)]
     pub view: usize,
 
@@ -155,7 +155,7 @@ pub struct SimulateArguments {
     pub size: Option<Size>,
 }
 
-/// Simulates and prints.
+/// Simulates and prints the results.
 pub fn run(arguments: &SimulateArguments) -> Result<(), Error> {
     if arguments.paper {
         return print(&match arguments.format {
@@ -170,7 +170,7 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Error> {
             source,
         });
     }
-    // Mistakes on the command line should not wait for a large scene.
+    // Errors of the command line are reported before a large scene is drawn.
     let config = config(arguments)?;
     let machines = if arguments.sweep.is_empty() {
         vec![(machine_name(arguments), config.clone())]
@@ -245,18 +245,18 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Error> {
     })
 }
 
-/// A frame's tiles in the modules, a frame alone.
+/// The tiles of a frame in the modules, for the frame alone.
 fn tile_spans(frame: &FrameWork, config: &Config) -> Vec<TileSpan> {
     fast::rasterize_tiles(&simulate::of_rasterizer(frame, config), config, 0.0).1
 }
 
-/// The area that Gaussians add to each of `count` rows, which are of as many machines or all of one.
+/// The area that Gaussians add on each of `count` machines, or on the same one.
 fn areas(machines: &[(String, Config)], count: usize) -> Vec<f64> {
     let of = |(_, config): &(String, Config)| area::area(config).added;
     machines.iter().map(of).cycle().take(count).collect()
 }
 
-/// The frame on every machine, on all of the host's cores.
+/// Simulates the frame on every machine, on all of the host's cores.
 fn simulate_all(frame: &FrameWork, machines: &[(String, Config)]) -> Vec<(String, Simulation)> {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let each = machines.len().div_ceil(cores).max(1);
@@ -274,10 +274,10 @@ fn simulate_all(frame: &FrameWork, machines: &[(String, Config)]) -> Vec<(String
     })
 }
 
-/// Most pairs that are stepped clock by clock, some minutes of work.
+/// The greatest number of pairs that are stepped clock by clock, which takes some minutes.
 const MAX_STEPPED_PAIRS: u64 = 1 << 24;
 
-/// Each frame's cycles by both models, where frames come one at a time and where they overlap as the hardware lets them.
+/// The cycles of each frame by both models, for single frames and for frames that overlap as the hardware allows.
 fn models(trace: &Trace, config: &Config) -> Result<Vec<report::Compared>, Error> {
     let pairs = trace.frames.iter().map(FrameWork::pairs).sum();
     if pairs > MAX_STEPPED_PAIRS {
@@ -343,13 +343,13 @@ fn read(path: &Path) -> Result<String, Error> {
     })
 }
 
-/// The most machines of a range.
+/// The greatest number of machines of a range.
 const MAX_MACHINES: u32 = 64;
 
-/// The most machines of all combinations.
+/// The greatest number of machines of all combinations.
 const MAX_GRID: usize = 10_000;
 
-/// Every combination of what sweeps go through, the last one changing fastest.
+/// Every combination of the values of sweeps; the last one changes fastest.
 fn grid(sweeps: &[String]) -> Result<Vec<Vec<String>>, Error> {
     let mut grid = vec![Vec::new()];
     for sweep in sweeps {
@@ -369,7 +369,7 @@ fn grid(sweeps: &[String]) -> Result<Vec<Vec<String>>, Error> {
     Ok(grid)
 }
 
-/// The settings that a sweep goes through.
+/// The settings of a sweep.
 fn sweep_values(sweep: &str) -> Result<Vec<String>, Error> {
     let wrong = || Error::Sweep(sweep.to_owned());
     let (name, values) = sweep.split_once('=').ok_or_else(wrong)?;
@@ -391,7 +391,7 @@ fn sweep_values(sweep: &str) -> Result<Vec<String>, Error> {
         .collect())
 }
 
-/// The work of the scene, drawn for it or read from a file.
+/// The work of the scene, from drawing it or from a file.
 fn work(arguments: &SimulateArguments) -> Result<Trace, Error> {
     match &arguments.scene {
         Some(path)
@@ -420,7 +420,7 @@ fn load(path: &Path) -> Result<Trace, Error> {
     Ok(trace)
 }
 
-/// Draws the scene in a process of its own, which leaves the trace.
+/// Draws the scene in a process of its own, which writes the trace.
 fn draw(arguments: &SimulateArguments, folder: &Path) -> Result<Trace, Error> {
     let (trace, picture) = (folder.join("work.json"), folder.join("picture.png"));
     let mut command = Command::new(std::env::current_exe()?);
@@ -454,7 +454,7 @@ fn draw(arguments: &SimulateArguments, folder: &Path) -> Result<Trace, Error> {
     load(&trace)
 }
 
-/// Writes the timeline of the trace's frames, over and over.
+/// Writes the timeline of the trace's frames, repeated until it has `count` frames.
 fn write_timeline(path: &Path, trace: &Trace, config: &Config, count: u16) -> Result<(), Error> {
     let simulate = |frame: &FrameWork| simulate::simulate(frame, config);
     let once: Vec<Simulation> = trace.frames.iter().map(simulate).collect();
@@ -465,7 +465,7 @@ fn write_timeline(path: &Path, trace: &Trace, config: &Config, count: u16) -> Re
     replace(path, &serde_json::to_vec(&json)?)
 }
 
-/// The tiles of each frame in the modules, within its span of the rasterizer.
+/// The tiles of each frame in the modules, within the frame's time in the rasterizer.
 fn module_spans(
     trace: &Trace,
     frames: &[Simulation],

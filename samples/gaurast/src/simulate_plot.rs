@@ -1,4 +1,5 @@
-//! Pictures of what was simulated: a sweep's curves, the front of its machines, roofs over the stages, and a frame's tiles.
+//! Plots of simulations: the curves of a sweep, the Pareto front of its machines, rooflines of the stages, and a
+//! frame's tiles.
 
 use std::fmt::Write as _;
 
@@ -15,10 +16,10 @@ use timing_studies::scatter::{self, Axis, Line, Plot, Point};
 /// A panel's size in pixels.
 const PANEL: [u32; 2] = [560, 380];
 
-/// Colours of the curves, for eyes of all kinds (Okabe and Ito).
+/// The colours of the curves, which people with colour blindness can tell apart (Okabe and Ito).
 const COLORS: [&str; 3] = ["#0072b2", "#d55e00", "#009e73"];
 
-/// A number of a simulation, and its name.
+/// A number of a simulation: its name and its function.
 type Number = (&'static str, fn(&Simulation) -> f64);
 
 const SPEED: [Number; 2] = [
@@ -31,7 +32,7 @@ const ENERGY: [Number; 3] = [
     ("memory", |result| result.energy.memory),
 ];
 
-/// An SVG of the machines' results; `swept` names what differs between them, which are named by its values.
+/// An SVG of the machines' results. `swept` names the parameter that differs, and each machine is named by its value.
 pub fn svg(swept: &str, results: &[(String, Simulation)]) -> String {
     chart::svg(&[
         panel([swept, "speed-up over the shader cores"], &SPEED, results),
@@ -60,7 +61,7 @@ fn panel(axes: [&str; 2], numbers: &[Number], results: &[(String, Simulation)]) 
     }
 }
 
-/// Machines by area and raster time; those that no other beats in both are named, and joined by a line.
+/// A plot of machines by area and raster time. Those on the Pareto front are named and joined by a line.
 pub fn pareto(machines: &[(String, Config)], results: &[(String, Simulation)]) -> String {
     let places: Vec<_> = machines
         .iter()
@@ -99,7 +100,8 @@ pub fn pareto(machines: &[(String, Config)], results: &[(String, Simulation)]) -
     plot.svg()
 }
 
-/// The stages under the roofs of the shader cores and of the rasterizer: operations a second over operations a byte.
+/// A roofline plot of the stages for the shader cores and the rasterizer: operations per second over operations per
+/// byte.
 pub fn roofline(frame: &FrameWork, result: &Simulation, config: &Config) -> String {
     let bandwidth = config.memory.bandwidth_gb_s * config.memory.efficiency;
     let shader = &config.shader;
@@ -149,7 +151,7 @@ pub fn roofline(frame: &FrameWork, result: &Simulation, config: &Config) -> Stri
         result.stages_alone.raster,
         COLORS[1],
     );
-    // From a byte's roof to the units' roof, and beyond the points.
+    // From the slope of memory to the limit of the units, and beyond the points.
     let most = points.iter().map(|point| point.at[0]).fold(100.0, f64::max);
     let least = points.iter().map(|point| point.at[0]).fold(0.1, f64::min);
     let roof = |name: &str, peak: f64, color| Line {
@@ -183,10 +185,10 @@ pub fn roofline(frame: &FrameWork, result: &Simulation, config: &Config) -> Stri
     plot.svg()
 }
 
-/// Pixels of the picture of a frame's tiles, at most.
+/// The greatest width of the picture of a frame's tiles in pixels.
 const WIDEST: f64 = 1280.0;
 
-/// A frame's tiles as squares, the darker the more cycles they take; the cycles are each square's title.
+/// A frame's tiles as squares, darker with more cycles. Each square's title has its cycles.
 pub fn tiles(frame: &FrameWork, spans: &[TileSpan], config: &Config) -> String {
     let [width, height] = frame.size.map(f64::from);
     let scale = (WIDEST / width.max(1.0)).min(1.0);
@@ -206,7 +208,7 @@ pub fn tiles(frame: &FrameWork, spans: &[TileSpan], config: &Config) -> String {
     for span in spans {
         let cycles = span.end - span.begin;
         let [x, y] = span.at.map(|at| f64::from(at) * side);
-        // From white over orange to dark red.
+        // The colours go from white over orange to dark red.
         let share = cycles / most;
         let [r, g, b] = [
             255.0 - 120.0 * share.powi(3),

@@ -1,4 +1,4 @@
-//! What a simulation says, as tables and as lines.
+//! Reports of a simulation, as tables and as lines.
 
 use comfy_table::presets::UTF8_FULL_CONDENSED;
 use comfy_table::{CellAlignment, ContentArrangement, Table};
@@ -33,12 +33,12 @@ fn share(part: f64, whole: f64) -> String {
     format!("{percent:.1} %")
 }
 
-/// Everything about one machine.
+/// The full report on one machine.
 pub fn one(frame: &FrameWork, result: &Simulation, config: &Config, spans: &[TileSpan]) -> String {
     let mut table = new_table();
     let mut last = "";
     let mut row = |group: &'static str, name: &str, value: String, note: String| {
-        // A group's name stands in its first row.
+        // A group's name is in its first row.
         let shown = if group == last { "" } else { group };
         last = group;
         table.add_row([shown, name, &value, &note]);
@@ -249,16 +249,16 @@ pub fn one(frame: &FrameWork, result: &Simulation, config: &Config, spans: &[Til
     format!("{table}\n")
 }
 
-/// The share of the stage above which a tile is most of it.
+/// The share of the stage's time above which a single tile is reported.
 const MOST_OF_THE_TIME: f64 = 0.5;
 
-/// The tile that takes most cycles.
+/// The tile with the most cycles.
 fn longest(spans: &[TileSpan]) -> Option<&TileSpan> {
     let cycles = |span: &TileSpan| span.end - span.begin;
     spans.iter().max_by(|a, b| cycles(a).total_cmp(&cycles(b)))
 }
 
-/// The main numbers of a result, and their names.
+/// The main numbers of a result, each with its name and its number of digits.
 fn summary(result: &Simulation) -> [(&'static str, f64, usize); 14] {
     [
         ("cycles", result.raster.cycles, 0),
@@ -300,18 +300,18 @@ pub fn many(results: &[(String, Simulation)]) -> String {
     format!("{table}\n")
 }
 
-/// A frame by the fast model and by the stepped one.
+/// The cycles of a frame by the fast model and by the stepped one.
 #[derive(Debug)]
 pub struct Compared {
-    /// From 0.
+    /// The frame's number, from 0.
     pub frame: usize,
-    /// Alone, or overlapping others.
+    /// The word for a single frame or for overlapping frames.
     pub how: &'static str,
     pub fast: RasterReport,
     pub stepped: RasterReport,
 }
 
-/// The fast model beside the stepped one: cycles, and the share of each cause of stalls.
+/// A table of both models: cycles, and the share of each cause of stalls.
 pub fn compared(frames: &[Compared]) -> String {
     let mut table = new_table();
     table.set_header(["frame", "", "", "fast", "stepped", "difference"]);
@@ -351,7 +351,7 @@ pub fn compared(frames: &[Compared]) -> String {
     format!("{table}\n")
 }
 
-/// A field of a line, quoted where that is needed.
+/// A field of a CSV line, quoted if necessary.
 fn field(text: &str) -> String {
     if text.contains([',', '"', '\n']) {
         format!("\"{}\"", text.replace('"', "\"\""))
@@ -360,7 +360,7 @@ fn field(text: &str) -> String {
     }
 }
 
-/// A line for each machine, with its area in mm2 where there is one for each.
+/// A CSV line for each machine, with its area in mm2 if there is one for each.
 pub fn csv(results: &[(String, Simulation)], areas: &[f64]) -> String {
     let mut out = String::new();
     for (index, (name, result)) in results.iter().enumerate() {
@@ -379,7 +379,7 @@ pub fn csv(results: &[(String, Simulation)], areas: &[f64]) -> String {
     out
 }
 
-/// The paper's numbers beside the model's.
+/// A table of the paper's numbers and the model's.
 pub fn paper(sections: &[Section]) -> String {
     let mut out = String::new();
     for section in sections {
@@ -402,7 +402,7 @@ pub fn paper(sections: &[Section]) -> String {
     out
 }
 
-/// The same, a line for each number.
+/// The same numbers as CSV, one line each.
 pub fn paper_csv(sections: &[Section]) -> String {
     let mut out = "section,item,paper,model,difference,label,how\n".to_owned();
     for section in sections {
@@ -453,7 +453,7 @@ mod tests {
             assert!(text.contains(part), "{part}: {text}");
         }
         let results = [("a,b".to_owned(), result.clone()), ("c".to_owned(), result)];
-        // Rows, not pieces of them.
+        // Compares whole rows.
         let cell = |row: &str, column: usize| -> String {
             let line = text.lines().find(|line| {
                 line.split('┆')

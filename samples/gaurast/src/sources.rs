@@ -1,4 +1,4 @@
-//! Scenes by file and by folder.
+//! The scene's files and folders.
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -13,7 +13,7 @@ use crate::progress::Progress;
 /// The generated garden's seed.
 const SEED: u64 = 1;
 
-/// Why there is no scene. Displayed as one sentence.
+/// A failure to read the scene. Displayed as one sentence.
 #[derive(Debug, Error)]
 pub enum SourceError {
     #[error(transparent)]
@@ -43,27 +43,27 @@ pub enum SourceError {
     Transforms { scenes: usize, transforms: usize },
 }
 
-/// The scene's files, and what lies beside them.
+/// The scene's files, and the files that belong to them.
 #[derive(Clone, Debug, Default)]
 pub struct Source {
-    /// The files, and where their Gaussians are put; the generated garden if there is none.
+    /// The files, each with its transform; the generated garden if there is none.
     pub files: Vec<(PathBuf, Transform)>,
-    /// What outputs are named after.
+    /// The base name of outputs.
     pub name: String,
     /// Cameras that belong to it.
     pub cameras: Option<PathBuf>,
     /// nerfstudio's dataparser_transforms.json.
     pub dataparser: Option<PathBuf>,
-    /// The background that it was trained with.
+    /// The background with which it was trained.
     pub background: Option<Background>,
-    /// What folders led to, a sentence each.
+    /// Notes about the contents of folders, a sentence each.
     pub notes: Vec<String>,
     /// The level of detail.
     level: u32,
 }
 
 impl Source {
-    /// The source that the command line names. What lies beside the first scene counts.
+    /// The source that the command line names. Files next to the first scene belong to it.
     ///
     /// # Errors
     /// If it is a folder without a scene, or there are more transforms than scenes.
@@ -101,7 +101,7 @@ impl Source {
         Ok(source)
     }
 
-    /// Tells if the scene is the generated garden.
+    /// Returns true if the scene is the generated garden.
     pub fn is_garden(&self) -> bool {
         self.files.is_empty()
     }
@@ -109,7 +109,7 @@ impl Source {
     /// Reads the scene, or generates it.
     ///
     /// # Errors
-    /// As the files' reader.
+    /// The errors of the file's reader.
     pub fn load(&self, progress: Progress) -> Result<(Scene, Duration), SourceError> {
         let start = Instant::now();
         if self.is_garden() {
@@ -228,7 +228,7 @@ fn newest_iteration(folder: &Path) -> Option<(u64, PathBuf)> {
         .max_by_key(|(iteration, _)| *iteration)
 }
 
-/// The scene file in `folder`, if there is exactly one.
+/// The only scene file in `folder`, or `None` if there are none or several.
 fn only_scene(folder: &Path) -> std::io::Result<Option<PathBuf>> {
     let known = gaurast_scene::known_extensions();
     let mut found = Vec::new();
@@ -237,7 +237,7 @@ fn only_scene(folder: &Path) -> std::io::Result<Option<PathBuf>> {
         let extension = path
             .extension()
             .map(|e| format!(".{}", e.to_string_lossy()));
-        // A .json may be anything.
+        // A .json file may be of any kind.
         let is_scene = |e: String| e != ".json" && known.split(", ").any(|k| k == e);
         if path.is_file() && extension.is_some_and(is_scene) {
             found.push(path);

@@ -1,5 +1,5 @@
 #version 460
-// A mesh's corners, coloured by their normals.
+// The vertices of a mesh, coloured by their normals.
 
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 normal;

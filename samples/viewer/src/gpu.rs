@@ -1,5 +1,5 @@
-//! Everything of Vulkan: a device that presents to a window, its pipelines, and a frame. Objects go with the process, but for
-//! those that depend on the window's size.
+//! All Vulkan code: a device that presents to a window, its pipelines, and a frame. The end of the process frees the
+//! objects, except those that depend on the window's size.
 
 #![cfg_attr(rustfmt, rustfmt_skip)] // A step a line, so that a few screens show everything.
 
@@ -10,24 +10,24 @@ use glam::DMat4;
 use winit::raw_window_handle::{HasDisplayHandle, HasWindowHandle};
 use winit::window::Window;
 
-/// What a function that can fail comes to.
+/// The result of a function that can fail.
 pub type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
 const DEPTH: vk::Format = vk::Format::D32_SFLOAT;
-/// First location of the spherical harmonics among the attributes.
+/// The first attribute location of the spherical harmonics.
 const FIRST_SH: u32 = 4;
 const VISIBLE: vk::MemoryPropertyFlags = vk::MemoryPropertyFlags::HOST_VISIBLE;
 
-/// A mesh's corner: its position and its normal.
+/// A vertex of a mesh: its position and its normal.
 pub type Vertex = [[f32; 3]; 2];
 
-/// The camera of a frame: a view that looks along +z, its projection, and the mesh's place.
+/// The camera of a frame: a view that looks along +z, its projection, and the mesh's model matrix.
 pub struct View { pub world_to_view: DMat4, pub projection: DMat4, pub mesh: DMat4 }
 
-/// A pipeline, its vertex buffers, and how many vertices they have.
+/// A pipeline, its vertex buffers, and the number of vertices.
 type Draw = (vk::Pipeline, Vec<vk::Buffer>, u32);
 
-/// A swapchain with what its images need. The semaphores say that an image may be presented.
+/// A swapchain with the objects of its images. A semaphore signals that its image may be presented.
 #[derive(Default)]
 struct Swapchain {
     raw: vk::SwapchainKHR, size: [u32; 2], is_outdated: bool,
@@ -35,7 +35,7 @@ struct Swapchain {
     depth: (vk::Image, vk::ImageView, vk::DeviceMemory),
 }
 
-/// A device, what it draws, and where.
+/// A device, the objects that it draws, and its swapchain.
 pub struct Gpu {
     physical: vk::PhysicalDevice, device: ash::Device, queue: vk::Queue, types: vk::PhysicalDeviceMemoryProperties,
     surfaces: ash::khr::surface::Instance, surface: vk::SurfaceKHR,
@@ -47,7 +47,7 @@ pub struct Gpu {
     _instance: ash::Instance, _entry: ash::Entry,
 }
 
-// SAFETY throughout: handles are used while they live, structures are valid, and commands are in order.
+// SAFETY of all `unsafe` here: handles are used while they are valid, structures are valid, and commands are in order.
 impl Gpu {
     pub fn new(entry: ash::Entry, window: &Window, mode: vk::PresentModeKHR, scene: &Scene, mesh: &[Vertex]) -> Outcome<Self> {
         // SAFETY: see above; the window outlives this.
@@ -76,7 +76,7 @@ impl Gpu {
             let info = vk::DeviceCreateInfo::default().queue_create_infos(&queues).enabled_extension_names(&names)
                 .push_next(&mut topology).push_next(&mut features);
             let device = instance.create_device(physical, &info, None)?;
-            // Colours of 3DGS are the display's: nothing converts them.
+            // The colours of 3DGS are meant for the display and are not converted.
             let formats = surfaces.get_physical_device_surface_formats(physical, surface)?;
             let unorm = [vk::Format::B8G8R8A8_UNORM, vk::Format::R8G8B8A8_UNORM];
             let format = formats.into_iter().find(|it| unorm.contains(&it.format)).ok_or("no format for the window")?;
@@ -119,7 +119,7 @@ impl Gpu {
         Ok(unsafe { self.device.allocate_memory(&info, None)? })
     }
 
-    /// A vertex buffer in the device's own memory, which is the faster for it.
+    /// A vertex buffer in device-local memory, from which draws are faster.
     fn vertex_buffer(&self, bytes: &[u8]) -> Outcome<vk::Buffer> {
         let device = &self.device;
         let create = |usage, wanted| {
@@ -132,7 +132,7 @@ impl Gpu {
                 Ok::<_, Box<dyn std::error::Error>>((buffer, memory))
             }
         };
-        // SAFETY: see above; the host writes before the copy is submitted, and what is done is waited for.
+        // SAFETY: see above; the host writes before the copy is submitted, and the copy is waited for.
         unsafe {
             let usage = vk::BufferUsageFlags::VERTEX_BUFFER | vk::BufferUsageFlags::TRANSFER_DST;
             let (buffer, _) = create(usage, vk::MemoryPropertyFlags::DEVICE_LOCAL)?;
@@ -183,7 +183,7 @@ impl Gpu {
         self.pipeline(&bindings, &attributes, PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST, &[], Some(state))
     }
 
-    /// A pipeline that tests depth. Gaussians are blended over what is there, and leave depth as it is.
+    /// A pipeline with a depth test. Gaussians are blended over the contents and do not write depth.
     fn pipeline(&self, bindings: &[vk::VertexInputBindingDescription], attributes: &[vk::VertexInputAttributeDescription],
         topology: vk::PrimitiveTopology, stages: &[vk::PipelineShaderStageCreateInfo<'_>],
         gaussian: Option<PipelineGaussianStateCreateInfoGAURAST<'_>>) -> Outcome<vk::Pipeline> {
@@ -222,11 +222,11 @@ impl Gpu {
         Ok(unsafe { self.device.create_image_view(&info, None)? })
     }
 
-    /// A swapchain for a window of a size, in the place of the one before.
+    /// Creates a swapchain for a window of a size, which replaces the one before.
     fn rebuild(&mut self, [width, height]: [u32; 2]) -> Outcome<()> {
         self.wait()?;
         let (device, old) = (&self.device, std::mem::take(&mut self.swapchain));
-        // SAFETY: see above; nothing uses the old swapchain's objects any more.
+        // SAFETY: see above; the old swapchain's objects are no longer used.
         unsafe {
             let can = self.surfaces.get_physical_device_surface_capabilities(self.physical, self.surface)?;
             let extent = match can.current_extent {
@@ -271,7 +271,7 @@ impl Gpu {
             device.wait_for_fences(&[self.drawn], true, u64::MAX)?;
             let index = match self.swapchains.acquire_next_image(chain.raw, u64::MAX, self.acquired, vk::Fence::null()) {
                 Ok((index, _)) => index,
-                // The next frame has a new one.
+                // The next frame creates a new swapchain.
                 Err(vk::Result::ERROR_OUT_OF_DATE_KHR) => { self.swapchain.is_outdated = true; return Ok(()); }
                 Err(error) => return Err(error.into()),
             };
@@ -346,7 +346,7 @@ impl Gpu {
 
 impl Drop for Gpu {
     fn drop(&mut self) {
-        // The window goes after this, so that nothing may be presented to it any more.
+        // The window is destroyed after this, so nothing may be presented to it later.
         // SAFETY: see above.
         unsafe {
             let _ = self.device.device_wait_idle();

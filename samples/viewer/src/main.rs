@@ -1,4 +1,5 @@
-//! A window in which a camera flies around a scene of Gaussians with a mesh in it: plain `ash`, `winit`, and a swapchain.
+//! A window in which a camera flies around a scene of Gaussians with a mesh in it: plain `ash`, `winit`, and a
+//! swapchain.
 
 #![cfg_attr(rustfmt, rustfmt_skip)] // A step a line, so that a few screens show everything.
 
@@ -18,38 +19,38 @@ use winit::event::WindowEvent;
 use winit::event_loop::{ActiveEventLoop, EventLoop};
 use winit::window::{Window, WindowId};
 
-/// Seconds that the camera takes around the scene, and the mesh around itself.
+/// The time, in seconds, of the camera's orbit around the scene and of the mesh's rotation.
 const ORBIT: f64 = 20.0;
 const TURN: f64 = 6.0;
 
-/// Flies around a scene of Gaussians with a mesh in it.
+/// Flies around a scene of Gaussians with a mesh in it
 #[derive(Parser)]
 struct Arguments {
-    /// The scene; a garden without one.
+    /// The scene file [default: a generated garden]
     file: Option<std::path::PathBuf>,
-    /// The window's width in pixels.
+    /// The window's width in pixels
     #[arg(long, default_value_t = 1280)]
     width: u32,
-    /// The window's height in pixels.
+    /// The window's height in pixels
     #[arg(long, default_value_t = 720)]
     height: u32,
-    /// After so many frames, say how many there were in a second, and end.
+    /// Exits after this number of frames and prints the frames per second
     #[arg(long)]
     frames: Option<u32>,
-    /// Don't wait for the display.
+    /// Does not wait for the display
     #[arg(long)]
     immediate: bool,
-    /// Draw with the first driver that the Vulkan loader finds, instead of the one that is linked in.
+    /// Draws with the first driver that the Vulkan loader finds, instead of the linked one
     #[arg(long)]
     loader: bool,
 }
 
-/// The window and what is shown in it, from the first event on.
+/// The window and its device, created at the first event.
 struct Viewer {
     arguments: Arguments,
     scene: Scene,
     extent: Extent,
-    /// It goes before the window that it presents to.
+    /// The device is dropped before the window to which it presents.
     shown: Option<(Gpu, Window)>,
     begin: Instant,
     frames: u32,
@@ -72,7 +73,7 @@ impl Viewer {
     fn draw(&mut self, events: &ActiveEventLoop) -> Outcome<()> {
         let Some((gpu, window)) = &mut self.shown else { return Ok(()) };
         let PhysicalSize { width, height } = window.inner_size();
-        // There is nothing to draw to while the window is minimized; when it is not, it asks again.
+        // A minimized window has no pixels; it requests a redraw when it is shown again.
         if width == 0 || height == 0 {
             return Ok(());
         }
@@ -89,7 +90,7 @@ impl Viewer {
         Ok(())
     }
 
-    /// Ends the program where something failed.
+    /// Ends the program if a step failed.
     fn check(&mut self, events: &ActiveEventLoop, outcome: Outcome<()>) {
         if outcome.is_err() {
             self.outcome = outcome;
@@ -118,8 +119,8 @@ impl ApplicationHandler for Viewer {
     }
 }
 
-/// The camera after so many seconds: it looks along +z, with x to the right and y downwards, from a circle about the
-/// scene's middle; and the mesh, which turns there.
+/// The view after a number of seconds. The camera moves on a circle around the scene's centre and looks along +z, with
+/// x to the right and y downwards. The mesh rotates at the centre.
 fn view(extent: &Extent, seconds: f64, aspect: f64) -> View {
     let (centre, radius) = (DVec3::from_array(extent.centre), extent.radius());
     let (sin, cos) = (TAU * seconds / ORBIT).sin_cos();

@@ -1,1 +1,1 @@
-//! Nothing but tests: see `tests/arrows`.
+//! An empty library: the package consists of the tests in `tests/arrows`.

@@ -1,9 +1,9 @@
-//! Pairs of tiles and Gaussians of generated scenes as large as the paper's, over the camera paths of its data set:
-//! `paper_scenes FOLDER [VIEWS] > simdevice/timing/studies/generated_scenes.toml`, where FOLDER has bicycle.json, garden.json,
-//! room.json and bonsai.json, cameras.json files of the original 3DGS code.
+//! Counts pairs of tiles and Gaussians in generated scenes of the paper's sizes, over the camera paths of the paper's
+//! data set: `paper_scenes FOLDER [VIEWS] > simdevice/timing/studies/generated_scenes.toml`. FOLDER has bicycle.json,
+//! garden.json, room.json and bonsai.json, which are cameras.json files of the original 3DGS code.
 //!
-//! The scenes are gardens, not the paper's: they have the published counts and sizes and nothing else of them. A path is
-//! moved and scaled so that it goes around the garden's middle at the distance that the garden is composed for.
+//! The scenes are generated gardens. They share only the published counts and picture sizes with the paper's scenes. A
+//! path is moved and scaled so that it goes around the garden's centre at the distance for which the garden is made.
 
 use std::error::Error;
 use std::path::Path;
@@ -12,7 +12,7 @@ use gaurast_render::Renderer;
 use gaurast_scene::Camera;
 use glam::{DMat3, DQuat, DVec3};
 
-/// Name, Gaussians in millions, size, and the scene whose path is taken.
+/// Name, Gaussians in millions, picture size, and the scene whose camera path is used.
 const SCENES: [(&str, f64, [u32; 2], &str); 7] = [
     ("bicycle", 6.06, [1237, 822], "bicycle"),
     ("stump", 4.82, [1245, 825], "garden"),
@@ -23,7 +23,7 @@ const SCENES: [(&str, f64, [u32; 2], &str); 7] = [
     ("bonsai", 1.24, [1559, 1039], "bonsai"),
 ];
 
-/// The counters that are kept, by category and name, and what they are called.
+/// The counters that are kept, by category and name, and their names in the output.
 const KEPT: [(&str, &str); 4] = [
     ("tile pairs", "pairs"),
     ("tile pairs evaluated", "needed"),
@@ -47,7 +47,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let cameras = around_the_garden(&path_cameras, size, views)?;
         let mut renderer = Renderer::new(vulkan_gaurast::entry())?;
         let count = (millions * 1e6) as usize;
-        // The host's copy goes as soon as the device has its own.
+        // The host's copy is dropped once the device has its own.
         let scene = renderer.upload(&gaurast_scene::garden::scene(1, count), Some(0))?;
         let mut sums = [0.0; KEPT.len()];
         for camera in &cameras {
@@ -76,10 +76,10 @@ fn around_the_garden(
     let axes = |camera: &Camera| camera.rotation.map(DVec3::from_array);
     let [_, down, forward] = axes(&garden);
     let eye = DVec3::from_array(garden.eye);
-    // The garden's camera looks at its middle, one unit above the ground, from 6.08 units away.
+    // The garden's camera looks at the garden's centre, one unit above the ground, from 6.08 units away.
     let distance = DVec3::new(2.3, 0.55, 5.6).length();
     let middle = eye + forward * distance;
-    // Level ground: what is down in the garden's camera, less its tilt.
+    // The ground is level: the down direction of the garden's camera without the camera's tilt.
     let tilt = (0.55 / distance).asin();
     let down = down * tilt.cos() + forward * tilt.sin();
 

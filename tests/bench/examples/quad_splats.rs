@@ -1,7 +1,8 @@
-//! Gaussians without the Gaussian topology: blended quads, sorted on the processor, as any Vulkan device can draw them.
+//! Draws Gaussians without the Gaussian topology: as blended quads, sorted on the processor, on any Vulkan device.
 //!
-//! `quad_splats [DEVICE [SCENE]]` writes quad_splats.png by the loader's first device whose name holds DEVICE (such as
-//! llvmpipe), or by this driver without one. `gaurast render` draws the same picture as it is meant.
+//! `quad_splats [DEVICE [SCENE]]` writes quad_splats.png. It uses the loader's first device whose name contains DEVICE
+//! (such as llvmpipe), or this driver if no DEVICE is given. `gaurast render` draws the same picture with the Gaussian
+//! topology.
 
 use gaurast_bench::quads::QuadRenderer;
 

@@ -1,4 +1,4 @@
-//! Gaussians as blended quads, the peer that the Gaussian topology is measured against. The measurements themselves are the
-//! program `gaurast-bench`.
+//! Gaussians as blended quads, with which the Gaussian topology is compared. The program `gaurast-bench` does the
+//! measurements.
 
 pub mod quads;

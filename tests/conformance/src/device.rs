@@ -1,7 +1,7 @@
-//! An implementation under test: an instance, a device with every feature of the extension that it offers, and a queue.
+//! A Vulkan device under test: an instance, a device with every feature of the extension that it supports, and a queue.
 //!
-//! `unsafe` has one reason throughout this crate: these are Vulkan calls on objects of one [`Device`], made as the
-//! specification allows, and every submission is waited for before what it uses is destroyed.
+//! The reason for all `unsafe` in this crate is the same: these are Vulkan calls on objects of one [`Device`], made as
+//! the specification allows, and every submission is waited for before the objects that it uses are destroyed.
 
 use std::cell::RefCell;
 use std::ffi::c_void;
@@ -13,7 +13,7 @@ use gaurast::gaussian_primitive_topology;
 use gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST as Features;
 use gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST as Properties;
 
-/// Reason why a command failed, or there is nothing to test.
+/// The reason for which a command failed, or no device can be tested.
 #[derive(Debug)]
 pub struct Error(pub String);
 
@@ -32,23 +32,24 @@ pub struct Device {
     memory: vk::PhysicalDeviceMemoryProperties,
     pub(crate) physical_device: vk::PhysicalDevice,
     pub(crate) instance: ash::Instance,
-    /// Features that the device offers, all of which are enabled.
+    /// The supported features, all of which are enabled.
     pub features: Features<'static>,
     depth_bounds: bool,
     /// The extension's properties.
     pub properties: Properties<'static>,
     /// The device's name.
     pub name: String,
-    /// Last: it may own the library that all others call.
+    /// Dropped last, because it may own the library of all functions above.
     _entry: ash::Entry,
 }
 
 impl Device {
-    /// The device of a driver: `embedded`, the one that is linked with this program; a manifest's path, that of the loader
-    /// with this manifest alone; `loader`, the loader's first that draws Gaussians; or a part of such a device's name.
+    /// Opens a driver's device. `driver` is one of these: `embedded` for the driver that is linked into this program;
+    /// the path of a manifest, which becomes the loader's only one; `loader` for the loader's first device that draws
+    /// Gaussians; or a part of such a device's name.
     ///
     /// # Errors
-    /// If there is none, or Vulkan fails.
+    /// If there is no such device, or Vulkan fails.
     pub fn open(driver: &str) -> Result<Self, Error> {
         if driver == "embedded" {
             return Self::of(vulkan_gaurast::entry(), "");
@@ -58,7 +59,7 @@ impl Device {
             .is_some_and(|extension| extension == "json");
         if is_manifest {
             for variable in ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"] {
-                // SAFETY: the program opens its device before it has a second thread.
+                // SAFETY: the program opens its device before it starts a second thread.
                 unsafe { std::env::set_var(variable, driver) };
             }
         }
@@ -69,10 +70,10 @@ impl Device {
         Self::of(entry, if any { "" } else { driver })
     }
 
-    /// The first device of `entry` that draws Gaussians and has `name` in its name.
+    /// Opens the first device of `entry` that draws Gaussians and whose name contains `name`.
     ///
     /// # Errors
-    /// If there is none, or Vulkan fails.
+    /// If there is no such device, or Vulkan fails.
     pub fn of(entry: ash::Entry, name: &str) -> Result<Self, Error> {
         let application = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
         let instance_info = vk::InstanceCreateInfo::default().application_info(&application);
@@ -133,7 +134,7 @@ impl Device {
         }
     }
 
-    /// Reports whether images of a format can be attachments of a usage, and copied from and to.
+    /// Returns true if images of a format can have a usage and can be copied from and to.
     pub(crate) fn has_format(&self, format: vk::Format, usage: vk::FormatFeatureFlags) -> bool {
         // SAFETY: see the module.
         let properties = unsafe {
@@ -143,12 +144,12 @@ impl Device {
         properties.optimal_tiling_features.contains(usage)
     }
 
-    /// Reports whether depth bounds can be tested.
+    /// Returns true if the device supports the depth bounds test.
     pub(crate) fn has_depth_bounds(&self) -> bool {
         self.depth_bounds
     }
 
-    /// Records commands, submits them and waits for their end.
+    /// Records commands, submits them and waits for their completion.
     pub(crate) fn run(&self, record: impl FnOnce(vk::CommandBuffer)) -> Result<(), Error> {
         let allocate_info = vk::CommandBufferAllocateInfo::default()
             .command_pool(self.pool)
@@ -190,7 +191,7 @@ impl Drop for Device {
     }
 }
 
-/// The first physical device with the extension and `name` in its name.
+/// The first physical device with the extension whose name contains `name`.
 fn find(instance: &ash::Instance, name: &str) -> Result<Option<vk::PhysicalDevice>, vk::Result> {
     // SAFETY: see the module.
     unsafe {
@@ -215,7 +216,7 @@ fn find(instance: &ash::Instance, name: &str) -> Result<Option<vk::PhysicalDevic
 
 type Destroy = Box<dyn FnOnce(&ash::Device)>;
 
-/// Objects of one draw, which are destroyed with it, the last one first.
+/// The objects of one draw. They are destroyed together, in reverse order of creation.
 pub(crate) struct Scope<'a> {
     pub(crate) device: &'a Device,
     objects: RefCell<Vec<Destroy>>,
@@ -245,7 +246,7 @@ impl<'a> Scope<'a> {
         }
     }
 
-    /// Has something done when the scope ends.
+    /// Registers a function that is called at the end of the scope.
     pub(crate) fn later(&self, destroy: impl FnOnce(&ash::Device) + 'static) {
         self.objects.borrow_mut().push(Box::new(destroy));
     }
@@ -281,7 +282,7 @@ impl<'a> Scope<'a> {
             | Usage::UNIFORM_BUFFER;
         let create_info = vk::BufferCreateInfo::default().size(size).usage(usage);
         let device = &self.device.raw;
-        // SAFETY: see the module; the mapping has room for the bytes.
+        // SAFETY: see the module; the mapping is large enough for the bytes.
         unsafe {
             let raw = device.create_buffer(&create_info, None)?;
             self.later(move |device| device.destroy_buffer(raw, None));
@@ -299,7 +300,7 @@ impl<'a> Scope<'a> {
     pub(crate) fn buffer_of<T: NoUninit>(&self, data: &[T]) -> Result<Buffer, Error> {
         let bytes: &[u8] = bytemuck::cast_slice(data);
         let buffer = self.buffer(bytes.len() as u64)?;
-        // SAFETY: see the module; the buffer has room for the bytes.
+        // SAFETY: see the module; the buffer is large enough for the bytes.
         unsafe {
             buffer
                 .mapped
@@ -309,10 +310,10 @@ impl<'a> Scope<'a> {
         Ok(buffer)
     }
 
-    /// The first `count` values that a buffer holds.
+    /// Reads the first `count` values of a buffer.
     pub(crate) fn read<T: AnyBitPattern>(&self, buffer: &Buffer, count: usize) -> Vec<T> {
         let mut bytes = vec![0_u8; buffer.size as usize];
-        // SAFETY: see the module; the buffer has as many bytes.
+        // SAFETY: see the module; the buffer is large enough.
         unsafe {
             buffer
                 .mapped
@@ -323,7 +324,7 @@ impl<'a> Scope<'a> {
         values.map(bytemuck::pod_read_unaligned).collect()
     }
 
-    /// An attachment of width x height pixels, which can be copied.
+    /// An attachment of width x height pixels, which can be copied from and to.
     pub(crate) fn image(
         &self,
         format: vk::Format,
@@ -377,7 +378,7 @@ impl Drop for Scope<'_> {
     }
 }
 
-/// The only level and layer.
+/// The range of the only level and layer.
 pub(crate) fn whole(aspect: vk::ImageAspectFlags) -> vk::ImageSubresourceRange {
     vk::ImageSubresourceRange::default()
         .aspect_mask(aspect)

@@ -1,4 +1,4 @@
-//! A draw as plain data: what an application records, and what the oracle is asked.
+//! A draw as plain data, from which the commands are recorded and the oracle computes its answer.
 
 use ash::vk;
 use gaurast::vk::{
@@ -21,30 +21,30 @@ pub type Camera = GaussianCameraGAURAST<'static>;
 /// Width and height of pictures, in pixels. Odd, so that tiles are cut.
 pub const SIZE: [u32; 2] = [107, 83];
 
-/// One render pass with Gaussian draws, and what it begins with.
+/// One render pass with Gaussian draws, and the initial contents of its attachments.
 #[derive(Clone, Debug)]
 pub struct Draw {
     /// Contents of the vertex buffers.
     pub scene: SceneBuffers,
-    /// Attributes are stored as binary16.
+    /// True if attributes are stored as binary16.
     pub half: bool,
     /// The pipeline's degree, at most that of the scene.
     pub degree: u32,
-    /// The Gaussian state; its degree and locations are filled in.
+    /// The Gaussian state. Its degree and locations are set when the pipeline is created.
     pub state: State,
-    /// `exponentialError` and `contributionBudget`, if the structure is chained.
+    /// `exponentialError` and `contributionBudget`, if that structure is chained.
     pub approximation: Option<[f32; 2]>,
     /// The camera.
     pub camera: Camera,
-    /// The camera comes from a uniform buffer.
+    /// True if the camera comes from a uniform buffer.
     pub camera_in_buffer: bool,
-    /// Model matrices with factors of the opacity, and how they advance.
+    /// Model matrices with opacity factors, and their input rate.
     pub instances: Option<(vk::VertexInputRate, Vec<OracleInstance>)>,
     /// The index buffer.
     pub indices: Vec<u32>,
-    /// Calls that are recorded.
+    /// The recorded commands.
     pub calls: Vec<Call>,
-    /// The calls are one set, or several at [`Call::EndSet`]; otherwise each call is a set.
+    /// True if the calls are one set, or several that are separated by [`Call::EndSet`]; false if each call is a set.
     pub merged: bool,
     /// Width and height of the attachments, in pixels.
     pub size: [u32; 2],
@@ -64,13 +64,13 @@ pub struct Draw {
     pub write_mask: vk::ColorComponentFlags,
     /// Depth and stencil.
     pub depth: Option<Depth>,
-    /// Samples of a pixel.
+    /// Number of samples per pixel.
     pub samples: u32,
-    /// Samples that are written.
+    /// Mask of the samples that are written.
     pub sample_mask: u32,
 }
 
-/// A command.
+/// A draw command or the end of a set.
 #[derive(Clone, Copy, Debug)]
 pub enum Call {
     /// `vkCmdDraw`.
@@ -84,19 +84,19 @@ pub enum Call {
     Indexed {
         /// The first index and their number.
         indices: [u32; 2],
-        /// What is added to each.
+        /// The vertex offset, which is added to each index.
         offset: i32,
     },
-    /// `vkCmdDrawIndirect` of one draw, whose parameters lie in a buffer.
+    /// `vkCmdDrawIndirect` of one draw, whose parameters are in a buffer.
     Indirect {
         /// The first vertex and their number.
         vertices: [u32; 2],
     },
-    /// The set ends, and another one begins.
+    /// The end of a set and the beginning of another one.
     EndSet,
 }
 
-/// Ways in which a fragment reaches the colour attachment.
+/// The blending of fragments with the colour attachment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Blend {
     /// `ONE`, `ONE_MINUS_SRC_ALPHA`.
@@ -105,7 +105,7 @@ pub enum Blend {
     Replace,
     /// `ONE`, `ONE`.
     Add,
-    /// `ONE_MINUS_DST_ALPHA`, `ONE`: what is drawn lies behind.
+    /// `ONE_MINUS_DST_ALPHA`, `ONE`: the fragments are behind the contents.
     Under,
 }
 
@@ -121,7 +121,7 @@ pub enum ColorFormat {
 }
 
 impl ColorFormat {
-    /// The format, as Vulkan names it.
+    /// The Vulkan format.
     pub fn raw(self) -> vk::Format {
         match self {
             Self::Float32 => vk::Format::R32G32B32A32_SFLOAT,
@@ -130,7 +130,7 @@ impl ColorFormat {
         }
     }
 
-    /// Bytes of a texel.
+    /// The number of bytes of a texel.
     pub(crate) fn texel(self) -> u64 {
         match self {
             Self::Float32 => 16,
@@ -139,7 +139,7 @@ impl ColorFormat {
         }
     }
 
-    /// What storing a number of at most `greatest` may change of it: half a step.
+    /// The greatest rounding error of storing a number of at most `greatest`: half a step of the format.
     pub(crate) fn rounding(self, greatest: f64) -> f64 {
         match self {
             Self::Float32 => 0.0,
@@ -149,7 +149,7 @@ impl ColorFormat {
     }
 }
 
-/// A depth and stencil attachment, what it holds before, and the tests.
+/// A depth and stencil attachment: its format, its initial contents, and the tests.
 #[derive(Clone, Copy, Debug)]
 pub struct Depth {
     /// `D16_UNORM`, `D32_SFLOAT`, `X8_D24_UNORM_PACK32` or `D32_SFLOAT_S8_UINT`.
@@ -160,7 +160,7 @@ pub struct Depth {
     pub bounds: Option<[f32; 2]>,
     /// The stencil test.
     pub stencil: Option<vk::StencilOpState>,
-    /// What is stored: the depths of these depth variables in stripes, and stencils 0 to 7.
+    /// The initial contents: stripes with the depths of these depth variables, and stencils 0 to 7.
     pub stripes: [f32; 6],
 }
 
@@ -177,7 +177,7 @@ impl Depth {
         self.format == vk::Format::D32_SFLOAT_S8_UINT
     }
 
-    /// Bytes of a depth.
+    /// The number of bytes of a depth.
     pub(crate) fn texel(&self) -> u64 {
         if self.format == vk::Format::D16_UNORM {
             2
@@ -188,7 +188,7 @@ impl Depth {
 }
 
 impl Draw {
-    /// All of a scene in the default state, over nothing, from in front.
+    /// A draw of the whole scene in the default state over an empty picture, with the front camera.
     pub fn new(scene: SceneBuffers) -> Self {
         let count = scene.positions.len() as u32;
         Self {
@@ -220,21 +220,21 @@ impl Draw {
         }
     }
 
-    /// The same in another state.
+    /// The same with a changed state.
     #[must_use]
     pub fn in_state(mut self, change: impl FnOnce(State) -> State) -> Self {
         self.state = change(self.state);
         self
     }
 
-    /// The same through another camera.
+    /// The same with another camera.
     #[must_use]
     pub fn seen_by(mut self, camera: Camera) -> Self {
         self.camera = camera;
         self
     }
 
-    /// The viewport.
+    /// The viewport; the whole attachment by default.
     pub(crate) fn viewport(&self) -> vk::Viewport {
         self.viewport.unwrap_or_else(|| {
             let [width, height] = self.size.map(|side| side as f32);

@@ -1,4 +1,4 @@
-//! A driver's device as an implementation.
+//! A driver's device as an implementation under test.
 
 use gaurast_oracle::oracle::Stored;
 
@@ -11,10 +11,10 @@ use crate::record::record;
 pub struct Driver(Device);
 
 impl Driver {
-    /// The device of a driver, as [`Device::open`] finds it.
+    /// Opens the device of a driver, as [`Device::open`] does.
     ///
     /// # Errors
-    /// If there is none, or Vulkan fails.
+    /// If there is no such device, or Vulkan fails.
     pub fn open(driver: &str) -> Result<Self, Error> {
         Ok(Self(Device::open(driver)?))
     }

@@ -1,4 +1,4 @@
-//! What is held against the text.
+//! The interface of implementations under test.
 
 use gaurast_oracle::oracle::Stored;
 
@@ -8,23 +8,23 @@ use crate::draw::Draw;
 /// Contents of the attachments after a draw.
 #[derive(Clone, Debug, Default)]
 pub struct Picture {
-    /// Colours, row by row; resolved, if there are several samples.
+    /// Colours, row by row; resolved if there are several samples.
     pub color: Vec<[f32; 4]>,
-    /// Depths as numbers of their format and stencils, if they are tested and there is one sample.
+    /// Depths, as numbers of their format, and stencils, if they are tested and there is one sample.
     pub stored: Stored,
 }
 
-/// An implementation that is held against the text: a driver's device, or anything else that draws.
+/// An implementation under test: a driver's device, or any other renderer.
 pub trait Implementation {
-    /// Name that it gives itself.
+    /// The name of the implementation.
     fn name(&self) -> &str;
 
-    /// The first feature, limit or format that a draw needs and it lacks.
+    /// The first feature, limit or format that a draw needs and the implementation lacks.
     fn missing(&self, draw: &Draw) -> Option<&'static str>;
 
-    /// Draws, where the depth and stencil attachment holds what is `stored`.
+    /// Draws. `stored` is the initial contents of the depth and stencil attachment.
     ///
     /// # Errors
-    /// If it fails to.
+    /// If drawing fails.
     fn draw(&self, draw: &Draw, stored: &Stored) -> Result<Picture, Error>;
 }

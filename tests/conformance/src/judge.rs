@@ -1,4 +1,4 @@
-//! What a [`Draw`] must give, by the oracle, and whether a picture is that.
+//! The expected results of a [`Draw`], computed by the oracle, and the comparison of a picture with them.
 
 use std::collections::BTreeMap;
 
@@ -19,16 +19,16 @@ use crate::implementation::Picture;
 /// The distance from the envelope that the extension's text allows, per unit of the greatest colour above 1.
 const CONTRACT: f64 = 5e-6;
 
-/// Contents that the attachments may have after a draw.
+/// The contents that the attachments may have after a draw.
 #[derive(Clone, Debug)]
 pub struct Expected {
-    /// Colours.
+    /// The colours.
     pub color: Reference,
     /// Distance that a colour may have from the envelope.
     pub distance: f64,
-    /// Depths that each pixel may store, `None` where that is not known; empty where none is compared.
+    /// The depths that each pixel may store, `None` if they are not known; empty if depths are not compared.
     pub depth: Vec<Option<Vec<u32>>>,
-    /// Stencils that each pixel may store; empty where none is compared.
+    /// The stencils that each pixel may store; empty if stencils are not compared.
     pub stencil: Vec<Vec<u8>>,
 }
 
@@ -57,7 +57,7 @@ pub fn stored_before(draw: &Draw) -> Stored {
     }
 }
 
-/// What a draw must give.
+/// Computes the expected results of a draw.
 pub fn expected(draw: &Draw, before: &Stored) -> Expected {
     let pixels = (draw.size[0] * draw.size[1]) as usize;
     let state = OracleState::from(&draw.state);
@@ -113,7 +113,7 @@ pub fn expected(draw: &Draw, before: &Stored) -> Expected {
     }
 }
 
-/// Distance that a colour may have from the envelope, where none drawn is greater than `greatest`.
+/// The distance that a colour may have from the envelope, if no drawn colour exceeds `greatest`.
 fn distance(draw: &Draw, greatest: f64, sets: usize) -> f64 {
     let behind = draw.behind.iter().fold(0.0_f32, |most, c| most.max(*c));
     let range = greatest.max(behind.into());
@@ -127,7 +127,7 @@ fn distance(draw: &Draw, greatest: f64, sets: usize) -> f64 {
         }
         None => 0.0,
     };
-    // binary16 is defined to the bit; what remains is the blending of its fragments.
+    // binary16 is defined to the bit; only the blending of its fragments may differ.
     let exact = match draw.state.precision {
         Precision::FLOAT16 => 3e-7,
         _ => CONTRACT,
@@ -136,13 +136,13 @@ fn distance(draw: &Draw, greatest: f64, sets: usize) -> f64 {
     range * exact + approximate + stored
 }
 
-/// The pixels of a viewport, and where its corner is from theirs.
+/// The pixels of a viewport, and the position of its corner relative to them.
 struct Covered {
     /// The first column and row.
     first: [i64; 2],
     /// Columns and rows.
     size: [u32; 2],
-    /// The corner's place in pixels from that of the first pixel, at most half a pixel off.
+    /// The corner's position in pixels relative to the first pixel, at most half a pixel away.
     corner: [f32; 2],
 }
 
@@ -164,8 +164,8 @@ impl Covered {
     }
 }
 
-/// The camera of the pixels of the viewport. Where the viewport has fractions of pixels, that is another one unless it
-/// clamps no slope.
+/// The camera for the pixels of the viewport. A viewport with fractions of pixels is modelled exactly only if the
+/// camera clamps no slope.
 fn oracle_camera(draw: &Draw) -> OracleCamera {
     let covered = Covered::of(&draw.viewport());
     let mut camera = OracleCamera::new(&draw.camera, covered.size).expect("one of the four models");
@@ -188,10 +188,10 @@ fn tests(draw: &Draw) -> OracleTests {
     }
 }
 
-/// A Gaussian of a set: its vertex and its instance.
+/// A Gaussian of a set: the indices of its vertex and its instance.
 type Member = [u32; 2];
 
-/// The sorted sets of a draw, in the order in which ties are broken.
+/// The sorted sets of a draw. Their members are in the order that breaks ties.
 pub(crate) fn sets(draw: &Draw) -> Vec<Vec<Member>> {
     let (mut sets, mut open) = (Vec::<Vec<Member>>::new(), false);
     for call in &draw.calls {
@@ -229,7 +229,7 @@ pub(crate) fn sets(draw: &Draw) -> Vec<Vec<Member>> {
     sets
 }
 
-/// The attributes of a set's Gaussians, as they are after conversion to binary32, and their instances.
+/// The attributes of a set's Gaussians after conversion to binary32, and their instances.
 pub(crate) fn gathered(draw: &Draw, members: &[Member]) -> (SceneBuffers, Vec<OracleInstance>) {
     let scene = &draw.scene;
     let triples = (scene.degree + 1).pow(2) as usize;
@@ -265,7 +265,7 @@ pub(crate) fn gathered(draw: &Draw, members: &[Member]) -> (SceneBuffers, Vec<Or
     (all, instances)
 }
 
-/// The colour that an attachment makes of a colour, up to rounding.
+/// The colour after storing it in the attachment's format, up to rounding.
 fn stored_color(draw: &Draw, color: [f64; 4]) -> [f64; 4] {
     match draw.format {
         ColorFormat::Unorm8 => color.map(|component| component.clamp(0.0, 1.0)),
@@ -273,7 +273,7 @@ fn stored_color(draw: &Draw, color: [f64; 4]) -> [f64; 4] {
     }
 }
 
-/// Lays a set's fragments over what the attachment holds.
+/// Blends a set's fragments over the attachment's contents.
 fn blend(draw: &Draw, held: &mut Reference, drawn: &Reference) {
     let [left, top] = Covered::of(&draw.viewport()).first;
     let inside = |rectangle: Option<vk::Rect2D>, [x, y]: [i64; 2]| {
@@ -315,9 +315,9 @@ fn blend(draw: &Draw, held: &mut Reference, drawn: &Reference) {
     held.exhausted += drawn.exhausted;
 }
 
-/// One fragment, if there is one, and what is behind it.
+/// The result of blending one fragment, if there is one, with the contents behind it.
 fn blended(draw: &Draw, fragment: [f64; 4], behind: [f64; 4]) -> [f64; 4] {
-    // Every Gaussian that contributes leaves less light.
+    // Every contributing Gaussian increases alpha, so a zero means that there is no fragment.
     if fragment[3] <= 0.0 {
         return behind;
     }
@@ -349,7 +349,7 @@ impl Expected {
         verdict(&picture.color, &self.color, limits)
     }
 
-    /// What is wrong with a picture, if anything is.
+    /// A description of the first error in a picture, or `None` if it is correct.
     pub fn fault(&self, picture: &Picture) -> Option<String> {
         let verdict = self.verdict(picture);
         if !verdict.holds() {

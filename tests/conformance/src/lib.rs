@@ -1,9 +1,10 @@
-//! Cases that hold any implementation of `VK_GAURAST_gaussian_primitive_topology` against the extension's text.
+//! Conformance cases, which test any implementation of `VK_GAURAST_gaussian_primitive_topology` against the extension's
+//! text.
 //!
-//! A [`Case`] is a [`Draw`]: plain data of which both the commands and the oracle's answer follow, and the features that it
-//! needs, too. Cases are made from tables, chapter by chapter ([`cases`]). [`run`] has an [`Implementation`] draw one, and judges
-//! what the attachments hold by the binary64 oracle's envelope and the distance that the text allows.
-//! The program `gaurast-conformance` runs them on any driver; the workspace's tests run the same ones on this driver.
+//! A [`Case`] is a [`Draw`]: plain data from which the commands, the required features and the oracle's answer are
+//! derived. Cases are made from tables, by chapter ([`cases`]). [`run`] lets an [`Implementation`] draw a case, and
+//! compares the attachments with the binary64 oracle's envelope, within the distance that the text allows. The program
+//! `gaurast-conformance` runs the cases on any driver; the workspace's tests run them on this driver.
 
 pub mod cases;
 pub mod device;
@@ -27,10 +28,10 @@ pub use second::Second;
 
 use device::Error;
 
-/// The implementation of a name: `second`, or a driver as [`Driver::open`] takes it.
+/// Opens the implementation with this name: `second`, or a driver as [`Driver::open`] accepts it.
 ///
 /// # Errors
-/// If there is none.
+/// If there is no such implementation.
 pub fn open(name: &str) -> Result<Box<dyn Implementation>, Error> {
     match name {
         "second" => Ok(Box::new(Second)),

@@ -1,4 +1,4 @@
-//! `gaurast-conformance`: holds an implementation of the Gaussian primitive against the extension's text.
+//! `gaurast-conformance`: tests an implementation of the Gaussian primitive against the extension's text.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -10,21 +10,21 @@ use gaurast_conformance::{Case, Implementation, Outcome, all, cases, open, run};
 
 /// Runs the conformance cases of VK_GAURAST_gaussian_primitive_topology on a driver.
 ///
-/// Ends with 0 if no case fails, 1 if one does, and 2 if there is nothing to test.
+/// The exit code is 0 if no case fails, 1 if one does, and 2 if there is nothing to test.
 #[derive(Debug, Parser)]
 #[command(name = "gaurast-conformance", version)]
 struct Arguments {
-    /// `embedded`; a manifest for the Vulkan loader (ICD.json); `second`, the second implementation; `loader`, its first device that draws Gaussians; or a part of
-    /// such a device's name
+    /// `embedded`; the path of a manifest for the Vulkan loader (ICD.json); `second`, the second implementation;
+    /// `loader`, the loader's first device that draws Gaussians; or a part of such a device's name
     #[arg(long, value_name = "NAME|ICD.json", default_value = "embedded")]
     driver: String,
     /// Lists the cases and runs none
     #[arg(long)]
     list: bool,
-    /// Runs the cases that have PATTERN in their name (`*` stands for anything); may be given more than once
+    /// Runs the cases whose name contains PATTERN (`*` stands for any text); may be given more than once
     #[arg(long, value_name = "PATTERN")]
     case: Vec<String>,
-    /// Writes the results as JUnit's XML
+    /// Writes the results as JUnit XML
     #[arg(long, value_name = "FILE")]
     junit: Option<PathBuf>,
     /// Folder for pictures of failures: expected, drawn, and the distance from the envelope
@@ -33,7 +33,7 @@ struct Arguments {
     /// Prints every case, not only failures
     #[arg(long, short)]
     verbose: bool,
-    /// Has the embedded device make each of its mistakes, and tells which cases catch it
+    /// Makes the embedded device commit each of its deliberate mistakes, and prints the cases that catch it
     #[cfg(feature = "mistakes")]
     #[arg(long)]
     mistakes: bool,
@@ -107,7 +107,7 @@ fn line(counts: Counts) -> String {
     format!("{passed:4} Pass {failed:4} Fail {not_supported:4} NotSupported")
 }
 
-/// Runs a case, and prints what came of it.
+/// Runs a case and prints its outcome.
 fn tell(device: &dyn Implementation, case: &Case, arguments: &Arguments) -> Result {
     let start = Instant::now();
     let outcome = run(case, device);

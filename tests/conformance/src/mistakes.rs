@@ -1,4 +1,5 @@
-//! Proof that the cases can catch: the embedded device makes one mistake after the other, each of which some case must fail.
+//! A test of the cases themselves: the embedded device makes one deliberate mistake after another, and for each mistake
+//! some case must fail.
 
 use std::collections::BTreeMap;
 use std::process::ExitCode;
@@ -9,8 +10,8 @@ use crate::cases::Case;
 use crate::implementation::Implementation;
 use crate::run::{Outcome, run};
 
-/// Has the device make each mistake, and prints which cases catch it, by chapter. Fails if none does, or if a case fails where
-/// no mistake is made.
+/// Makes the device commit each mistake, and prints the cases that catch it, by chapter. Fails if no case catches a
+/// mistake, or if a case fails without a mistake.
 pub fn prove(device: &dyn Implementation, cases: &[Case]) -> ExitCode {
     let mut escaped = 0;
     make(None);

@@ -1,4 +1,5 @@
-//! A [`Draw`] on a device: its pipeline, its buffers, its commands, and what the attachments hold then.
+//! Execution of a [`Draw`] on a device: its pipeline, its buffers, its commands, and the final contents of the
+//! attachments.
 
 use ash::vk;
 use gaurast::vk::{
@@ -15,7 +16,7 @@ use crate::implementation::Picture;
 /// Vertex buffers of a scene: positions, scales, rotations, opacities, coefficients.
 const BINDINGS: u32 = 5;
 
-/// Locations of what instances hold: behind degree 3.
+/// The first location of instance attributes, after those of degree 3.
 const MODEL_MATRIX: u32 = 20;
 const MODEL_OPACITY: u32 = 23;
 
@@ -94,7 +95,7 @@ pub fn record(device: &Device, draw: &Draw, stored: &Stored) -> Result<Picture, 
                         device.gaussian.cmd_end_gaussian_set(commands);
                         device.gaussian.cmd_begin_gaussian_set(commands);
                     }
-                    // Each call is a set of its own.
+                    // Each call is a separate set.
                     Call::EndSet => {}
                 }
             }
@@ -192,7 +193,7 @@ impl Targets {
                         );
                     }
                 } else {
-                    // Images of several samples can't be copied to: they hold the far plane.
+                    // Images of several samples cannot be copied to, so they are cleared to the far plane.
                     let clear = vk::ClearDepthStencilValue {
                         depth: 1.0,
                         stencil: 0,
@@ -241,7 +242,7 @@ impl Targets {
         unsafe { device.cmd_begin_rendering(commands, &rendering) };
     }
 
-    /// The buffers of depths and stencils, and what is copied.
+    /// The buffers of depths and stencils, and the copies between them and the image.
     fn planes(&self, draw: &Draw) -> Vec<(Buffer, vk::BufferImageCopy)> {
         use vk::ImageAspectFlags as Aspect;
         let mut planes = vec![(self.depths, region(draw, Aspect::DEPTH))];
@@ -251,7 +252,7 @@ impl Targets {
         planes
     }
 
-    /// Copies what the attachments hold.
+    /// Copies the attachments to buffers.
     fn copy(&self, scope: &Scope<'_>, draw: &Draw, commands: vk::CommandBuffer) {
         use vk::ImageLayout as Layout;
         let device = &scope.device.raw;
@@ -349,7 +350,7 @@ fn region(draw: &Draw, aspect: vk::ImageAspectFlags) -> vk::BufferImageCopy {
         })
 }
 
-/// Whatever was done to an image before happens before whatever follows.
+/// Records a barrier on an image: all later accesses wait for all earlier ones.
 fn barrier(
     device: &ash::Device,
     commands: vk::CommandBuffer,
@@ -426,7 +427,7 @@ fn scene_buffers(scope: &Scope<'_>, draw: &Draw) -> Result<Vec<Buffer>, Error> {
     Ok(buffers)
 }
 
-/// A set with the camera's uniform buffer.
+/// A descriptor set with the camera's uniform buffer.
 fn camera_set(
     scope: &Scope<'_>,
     draw: &Draw,
@@ -477,7 +478,7 @@ fn camera_set(
     }
 }
 
-/// A pipeline's layout, and that of the camera's set.
+/// A pipeline layout, and the layout of the camera's descriptor set.
 struct Layout {
     raw: vk::PipelineLayout,
     sets: Option<vk::DescriptorSetLayout>,
@@ -617,7 +618,7 @@ fn depth_stencil(draw: &Draw) -> vk::PipelineDepthStencilStateCreateInfo<'static
             .max_depth_bounds(greatest);
     }
     if let Some(front) = depth.stencil {
-        // A Gaussian always faces front: back faces would do something else.
+        // A Gaussian is always front-facing. The back-face state is different, to show that it is not used.
         let back = vk::StencilOpState {
             pass_op: vk::StencilOp::INVERT,
             fail_op: vk::StencilOp::INVERT,

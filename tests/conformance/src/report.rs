@@ -1,4 +1,4 @@
-//! Results for machines: JUnit's XML.
+//! The results as JUnit XML.
 
 use std::fmt::Write;
 use std::time::Duration;
@@ -12,25 +12,25 @@ pub struct Result {
     pub chapter: &'static str,
     /// The name within the chapter.
     pub name: String,
-    /// Outcome.
+    /// The outcome.
     pub outcome: Outcome,
-    /// How long it took, the oracle's work included.
+    /// The time of the case, with the oracle's work included.
     pub time: Duration,
 }
 
 /// Numbers of cases.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// Those that passed.
+    /// Number of cases that passed.
     pub passed: usize,
-    /// Those that failed.
+    /// Number of cases that failed.
     pub failed: usize,
-    /// Those that the device does not support.
+    /// Number of cases that the device does not support.
     pub not_supported: usize,
 }
 
 impl Counts {
-    /// Counts results.
+    /// Counts the results.
     pub fn of<'a>(results: impl IntoIterator<Item = &'a Result>) -> Self {
         let mut counts = Self::default();
         for result in results {
@@ -43,13 +43,13 @@ impl Counts {
         counts
     }
 
-    /// All of them.
+    /// The number of all cases.
     pub fn all(&self) -> usize {
         self.passed + self.failed + self.not_supported
     }
 }
 
-/// The results as JUnit's XML, a suite for each chapter.
+/// The results as JUnit XML, with a test suite for each chapter.
 pub fn junit(device: &str, results: &[Result]) -> String {
     let mut xml = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
     let total = Counts::of(results);

@@ -1,4 +1,4 @@
-//! A case on an implementation, and what comes of it.
+//! Runs a case on an implementation.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
@@ -9,12 +9,12 @@ use crate::cases::Case;
 use crate::implementation::Implementation;
 use crate::judge::{Expected, expected, stored_before};
 
-/// What came of a case.
+/// The outcome of a case.
 #[derive(Clone, Debug)]
 pub enum Outcome {
-    /// The picture is right, and this far from the envelope.
+    /// The picture is correct; the number is its greatest distance from the envelope.
     Pass(f64),
-    /// Something is wrong.
+    /// The picture is wrong or drawing failed.
     Fail(Failure),
     /// The device lacks this feature, limit or format.
     NotSupported(&'static str),
@@ -23,15 +23,15 @@ pub enum Outcome {
 /// A case that failed.
 #[derive(Clone, Debug)]
 pub struct Failure {
-    /// What is wrong.
+    /// A description of the error.
     pub message: String,
-    /// What was expected and what was drawn, if anything was.
+    /// The expected and the drawn picture, if there is one.
     pub(crate) picture: Option<(Box<Expected>, Vec<[f32; 4]>)>,
 }
 
 impl Failure {
-    /// Writes a picture of three panels, expected, drawn, and how far it is from the envelope, as `path`; returns whether
-    /// there is one.
+    /// Writes a picture of three panels to `path`: expected, drawn, and the distance from the envelope. Returns true if
+    /// there is such a picture.
     pub fn write(&self, path: &Path) -> bool {
         self.picture.as_ref().is_some_and(|(expected, drawn)| {
             write_difference(path, drawn, &expected.color, expected.distance).is_ok()
@@ -39,7 +39,7 @@ impl Failure {
     }
 }
 
-/// Has an implementation draw the case, and judges the picture. What it does not support is not drawn.
+/// Lets an implementation draw the case, and judges the picture. An unsupported case is not drawn.
 pub fn run(case: &Case, implementation: &dyn Implementation) -> Outcome {
     let draw = case.draw();
     if let Some(feature) = implementation.missing(&draw) {

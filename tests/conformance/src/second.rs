@@ -1,4 +1,4 @@
-//! The second implementation, which was written from the text alone, under the same cases.
+//! The second implementation, which was written from the text alone, as an implementation under test.
 
 use ash::vk;
 use gaurast::vk::{

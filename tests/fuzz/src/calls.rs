@@ -1,4 +1,4 @@
-//! Any bytes as Vulkan calls.
+//! Fuzz target: the bytes are decoded as Vulkan calls.
 #![no_main]
 
 use gaurast_tests::fuzzing::calls;

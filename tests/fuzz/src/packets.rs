@@ -1,4 +1,4 @@
-//! Any bytes as packets of the simulated device.
+//! Fuzz target: the bytes are decoded as packets of the simulated device.
 #![no_main]
 
 use gaurast_tests::fuzzing::packets::Player;

@@ -1,5 +1,5 @@
-//! Any bytes as a shader module: it is refused, runs, or loses its device in time. A panic in the driver, which catches
-//! them so that applications never see one, ends the process here.
+//! Fuzz target: the bytes are used as a shader module, which is refused, runs, or loses its device within the time
+//! limit. The driver catches panics, so that applications never see one; in this program every panic ends the process.
 
 #![no_main]
 
@@ -11,7 +11,7 @@ thread_local! {
     static HARNESS: RefCell<Option<Harness>> = const { RefCell::new(None) };
 }
 
-/// The device, with a short time limit, in a process that ends at the first panic.
+/// Opens the device, with a short time limit, and makes every panic end the process.
 fn open() -> Harness {
     // SAFETY: no other thread runs yet that reads the environment.
     unsafe { std::env::set_var("GAURAST_TIMEOUT_MS", "20") };
@@ -29,7 +29,7 @@ fuzz_target!(|bytes: &[u8]| {
     }
     HARNESS.with_borrow_mut(|harness| {
         let harness = harness.get_or_insert_with(open);
-        // A module whose descriptors can't be had still goes through creation.
+        // A module whose descriptors cannot be determined is still created.
         let layout = Layout::of(&words).unwrap_or_default();
         harness.run(&words, &layout);
     });

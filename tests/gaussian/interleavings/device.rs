@@ -1,4 +1,4 @@
-//! An interleaving as packets.
+//! Execution of an interleaving as packets.
 
 use super::sequence::{Area, DepthTest, Interleaving, Picture, SIZE, Step};
 use crate::gaussian::packets::{attributes, buffer, image, stream, texels};
@@ -31,24 +31,24 @@ use simdevice::stats::recorder::Recorder;
 use simdevice::{CommandProcessor, Config, Device, Format, ImageView, Packet};
 use std::sync::Arc;
 
-/// Bytes of a vertex: position and colour.
+/// The number of bytes of a vertex: position and colour.
 const VERTEX: u64 = 32;
-/// Vertices that a workgroup of the compute program changes.
+/// The number of vertices that a workgroup of the compute program changes.
 const GROUP: u32 = 24;
 
-/// A device with its programs.
+/// A device with the programs of interleavings.
 pub struct Player {
     device: Arc<Device>,
     pipeline: Arc<DrawPipeline>,
     recolor: Arc<ComputeProgram>,
 }
 
-/// What packets are about.
+/// The resources of packets.
 struct Resources {
     color: ImageView,
     depth: ImageView,
     vertices: BufferRange,
-    /// Texels on their way.
+    /// The buffer for texels in transfers.
     texels: BufferRange,
     scenes: Vec<GaussianAttributes>,
 }
@@ -210,12 +210,12 @@ impl Resources {
 }
 
 impl Player {
-    /// A device of one thread, since interleavings are played by several.
+    /// Creates a device of one thread, since several run at the same time.
     pub fn new(flush: FlushPolicy) -> Self {
         Self::recording(flush, None)
     }
 
-    /// As [`Player::new`], and its work is recorded.
+    /// Creates a device as [`Player::new`] does; `recorder`, if given, records its work.
     pub fn recording(flush: FlushPolicy, recorder: Option<Arc<Recorder>>) -> Self {
         let config = Config {
             threads: 1,
@@ -240,7 +240,7 @@ impl Player {
         self.lower(interleaving, &Resources::new(interleaving))
     }
 
-    /// What an interleaving leaves in the attachments.
+    /// Plays an interleaving and returns the contents of the attachments.
     pub fn play(&self, interleaving: &Interleaving) -> Picture {
         let resources = Resources::new(interleaving);
         let mut processor = CommandProcessor::new(Arc::clone(&self.device));

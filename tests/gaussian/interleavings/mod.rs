@@ -1,5 +1,5 @@
-//! Random sequences of everything that one command processor does, triangles and Gaussians in the same passes,
-//! against a composite of their parts in binary64; and the same bits whenever passes are flushed.
+//! Random sequences of all steps that one command processor executes, with triangles and Gaussians in the same passes.
+//! They are compared with a binary64 composite of their parts, and are the same to the bit for all flush policies.
 
 mod device;
 mod model;
@@ -17,7 +17,7 @@ use sequence::{Interleaving, SIZE};
 use simdevice::runtime::FlushPolicy;
 use simdevice::stats::recorder::{Recorder, Trace};
 
-/// The work of a random interleaving.
+/// The recorded work of a random interleaving.
 pub(super) fn work(seed: u64) -> Trace {
     let recorder = Arc::new(Recorder::default());
     let player = Player::recording(FlushPolicy::WhenFull, Some(Arc::clone(&recorder)));
@@ -58,7 +58,7 @@ fn interleavings_are_the_composite_of_their_parts_whenever_they_are_flushed() {
     assert!(open * 100 < pixels, "{open} pixels have several outcomes");
 }
 
-/// The first interleaving that has every kind of step.
+/// The first interleaving that contains every kind of step.
 fn example() -> Interleaving {
     const KINDS: usize = 10;
     let has_all = |interleaving: &Interleaving| {
@@ -69,8 +69,8 @@ fn example() -> Interleaving {
     interleavings.find(has_all).expect("one that has all")
 }
 
-/// The packets of an interleaving, a line each, are what the file beside this one says. With `GAURAST_BLESS` set, they
-/// become that.
+/// The packets of an interleaving, one per line, equal those in the file `trace.txt`. With `GAURAST_BLESS` set, the
+/// file is rewritten.
 #[gaurast_runner::test]
 fn the_packets_of_an_interleaving_are_as_written_down() {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("gaussian/interleavings/trace.txt");

@@ -1,25 +1,25 @@
-//! An interleaving in binary64: what each pixel may hold after every step.
+//! A binary64 model of an interleaving: the possible contents of each pixel after every step.
 
 use super::sequence::{Area, DepthTest, Interleaving, Picture, SIZE, Step};
 use gaurast_tests::oracle::sample_tests::compare;
 use gaurast_tests::oracle::{OracleState, Stored, TestedReference, render_tested};
 use gaurast_tests::triangles::edges::covers;
 
-/// How far a Gaussian draw may be from its envelope, in any channel.
+/// The allowed distance of a Gaussian draw from its envelope, in any channel.
 const GAUSSIAN_SLACK: f64 = 5e-6;
-/// How far binary32's blending of one fragment may be off.
+/// The allowed error of binary32 blending of one fragment.
 const BLEND_SLACK: f64 = 3e-7;
 
-/// What a pixel may hold.
+/// The possible contents of a pixel.
 #[derive(Clone, Debug)]
 struct Pixel {
     least: [f64; 4],
     greatest: [f64; 4],
-    /// How far beyond those it may lie.
+    /// The allowed distance outside those colours.
     slack: f64,
-    /// Bits of depths, one of which it holds.
+    /// The bits of the possible depths.
     depths: Vec<u32>,
-    /// More medians were possible than are followed.
+    /// True if more medians are possible than are followed.
     is_unknown: bool,
 }
 
@@ -27,7 +27,7 @@ struct Pixel {
 pub struct Model<'a> {
     interleaving: &'a Interleaving,
     pixels: Vec<Pixel>,
-    /// The triangles' colours.
+    /// The current colours of the triangles.
     colors: Vec<[f32; 4]>,
 }
 
@@ -37,7 +37,7 @@ impl Pixel {
         (self.least, self.greatest, self.slack) = (color, color, 0.0);
     }
 
-    /// The hull of what it may hold and what `other` may.
+    /// Extends the possible contents to those of `other`.
     fn widen(&mut self, other: &Self) {
         for channel in 0..4 {
             self.least[channel] = self.least[channel].min(other.least[channel]);
@@ -53,7 +53,7 @@ impl Pixel {
         self.depths.dedup();
     }
 
-    /// A premultiplied colour over what it may hold.
+    /// Blends a premultiplied colour over all possible contents.
     fn over(&mut self, color: [f64; 4]) {
         let rest = 1.0 - color[3];
         for (channel, color) in color.into_iter().enumerate() {
@@ -79,7 +79,7 @@ impl<'a> Model<'a> {
         }
     }
 
-    /// Does all steps.
+    /// Executes all steps.
     pub fn play(&mut self) {
         for step in &self.interleaving.steps {
             self.step(step);
@@ -177,7 +177,7 @@ impl<'a> Model<'a> {
         let interleaving = self.interleaving;
         let scene = interleaving.scenes[scene].as_oracle();
         let tests = interleaving.tests(test);
-        // Once for each of the depths that pixels may hold.
+        // One round for each of the depths that a pixel may hold.
         let rounds = self.pixels.iter().map(|pixel| pixel.depths.len()).max();
         let references: Vec<TestedReference> = (0..rounds.unwrap_or(1))
             .map(|round| {
@@ -217,7 +217,7 @@ impl<'a> Model<'a> {
         }
     }
 
-    /// Holds a picture against it. Returns how many pixels are unknown, and how many have several outcomes.
+    /// Compares a picture with the model. Returns the number of unknown pixels, and of pixels with several outcomes.
     pub fn judge(&self, seed: u64, picture: &Picture) -> (usize, usize) {
         let (mut unknown, mut open) = (0, 0);
         for (at, pixel) in self.pixels.iter().enumerate() {
@@ -229,7 +229,7 @@ impl<'a> Model<'a> {
             for channel in 0..4 {
                 let value = f64::from(picture.color[at][channel]);
                 let outside = (pixel.least[channel] - value).max(value - pixel.greatest[channel]);
-                // What was copied as it is has no slack.
+                // Copied values have no error of their own.
                 let limit = pixel.slack.max(1e-12);
                 assert!(
                     outside <= limit,

@@ -8,11 +8,12 @@ use rand::seq::IndexedRandom;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// The side of the framebuffer in pixels, so that units of a position are halves of a pixel.
+/// The side of the framebuffer in pixels. With it, clip coordinates that are multiples of 1/64 are multiples of half a
+/// pixel.
 pub const SIZE: u32 = 64;
-/// Triangles that draws pick from.
+/// The number of triangles from which draws select.
 pub const TRIANGLES: usize = 24;
-/// Sets of Gaussians that draws pick from.
+/// The number of sets of Gaussians from which draws select.
 pub const SCENES: usize = 3;
 /// The near and the far plane.
 pub const PLANES: [f32; 2] = [1.0, 16.0];
@@ -31,16 +32,16 @@ pub struct Flat {
 /// A comparison, and whether depth is written.
 pub type DepthTest = Option<(CompareOp, bool)>;
 
-/// One thing that is done.
+/// A step of a sequence.
 #[derive(Clone, Debug)]
 pub enum Step {
-    /// With what colour and depth are cleared to, if they are.
+    /// Begins a pass with clear values for colour and depth, or loads both.
     BeginPass(Option<([f32; 4], f32)>),
     EndPass,
     Triangles {
         first: usize,
         count: usize,
-        /// Over, premultiplied; or instead.
+        /// True for premultiplied "over" blending, false for replacing.
         blends: bool,
         test: DepthTest,
     },
@@ -57,19 +58,19 @@ pub enum Step {
     /// Every triangle's colour becomes `color / 2 + 1/4`.
     Dispatch,
     ClearImage([f32; 4]),
-    /// Texels go to a buffer and from there to another place.
+    /// Copies texels to a buffer and from there to another place of the image.
     CopyThroughBuffer {
         from: Area,
         to: [u32; 2],
     },
-    /// One triangle's colour becomes that of another.
+    /// Copies one triangle's colour to another.
     CopyColor {
         from: usize,
         to: usize,
     },
 }
 
-/// A sequence of steps, and what they are about.
+/// A sequence of steps, and the objects that they use.
 pub struct Interleaving {
     pub triangles: Vec<Flat>,
     pub scenes: Vec<SceneBuffers>,
@@ -123,7 +124,7 @@ fn color(rng: &mut ChaCha8Rng) -> [f32; 4] {
     [r, g, b, alpha]
 }
 
-/// Few depths, so that some are equal.
+/// A random depth of a small set, so that some depths are equal.
 fn depth(rng: &mut ChaCha8Rng) -> f32 {
     *[0.6, 0.7, 0.8, 0.85, 0.9, 0.95].choose(rng).unwrap()
 }
@@ -147,7 +148,7 @@ fn triangle(rng: &mut ChaCha8Rng) -> Flat {
     }
 }
 
-/// Few Gaussians, large enough to cover much of the picture.
+/// A few random Gaussians, large enough to cover much of the picture.
 fn gaussians(rng: &mut ChaCha8Rng) -> SceneBuffers {
     let mut scene = scenes::cloud(rng.random(), rng.random_range(1..60), 0);
     for scale in &mut scene.scales {
@@ -175,7 +176,7 @@ fn test(rng: &mut ChaCha8Rng) -> DepthTest {
         .then(|| (*ops.choose(rng).unwrap(), rng.random()))
 }
 
-/// What is done within a pass.
+/// A random step within a pass.
 fn inside(rng: &mut ChaCha8Rng) -> Step {
     match rng.random_range(0..10) {
         0..4 => {
@@ -203,7 +204,7 @@ fn inside(rng: &mut ChaCha8Rng) -> Step {
     }
 }
 
-/// What is done between passes.
+/// A random step between passes.
 fn outside(rng: &mut ChaCha8Rng) -> Step {
     match rng.random_range(0..10) {
         0..4 => Step::Dispatch,
@@ -224,7 +225,7 @@ fn outside(rng: &mut ChaCha8Rng) -> Step {
     }
 }
 
-/// What the attachments hold: colours, and depths as bits.
+/// The contents of the attachments: colours, and depths as bits.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
     pub color: Vec<[f32; 4]>,

@@ -1,4 +1,4 @@
-//! Gaussians as a vertex program writes them.
+//! Gaussians as outputs of a vertex program.
 
 use gaurast_tests::oracle::shaded::OracleOutputs;
 use rand::{Rng, SeedableRng};
@@ -12,7 +12,7 @@ pub fn level(case: &gaurast_runner::Case) -> SimdLevel {
     level.expect("a level that the processor has").1
 }
 
-/// Gaussians of any shape, on the screen and beside it, with some depths that are equal.
+/// Gaussians of any shape, on the screen and outside it, some with equal depths.
 pub fn cloud(seed: u64, count: usize) -> Vec<OracleOutputs> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     (0..count)

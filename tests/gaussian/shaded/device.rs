@@ -1,4 +1,4 @@
-//! A device that is driven by packets, whose vertex program writes what it reads.
+//! A device that packets control. Its vertex program writes its inputs.
 
 use crate::gaussian::packets::{attributes, buffer, image, texels};
 use gaurast_tests::compare::{Limits, assert_contract};
@@ -25,10 +25,10 @@ use simdevice::stats::counters::Counters;
 use simdevice::{CommandProcessor, Config, Device, Format, ImageView, Packet};
 use std::sync::Arc;
 
-/// Neither side is a multiple of a tile's.
+/// The picture's size; neither side is a multiple of a tile's.
 pub const SIZE: [u32; 2] = [150, 83];
 
-/// Numbers of a vertex: position, covariance, opacity, colour, key.
+/// The number of floats of a vertex: position, covariance, opacity, colour, key.
 const NUMBERS: usize = 12;
 
 pub const UPRIGHT: OracleViewport = OracleViewport {
@@ -46,7 +46,7 @@ fn numbers(one: &OracleOutputs) -> [f32; NUMBERS] {
     numbers
 }
 
-/// A triangle at a depth of a quarter, whose edges cross pixels, that only writes depth.
+/// A triangle at a depth of a quarter that only writes depth. Its edges cross pixels.
 pub fn triangle(device: &Device, samples: u32) -> Draw {
     let mut builder = Builder::new();
     for slot in 0..4 {
@@ -106,7 +106,7 @@ pub fn triangle(device: &Device, samples: u32) -> Draw {
     }
 }
 
-/// All Gaussians of a scene of degree 0, as the device projects them.
+/// A packet of all Gaussians of a scene of degree 0, which the device projects.
 pub fn append(scene: &SceneBuffers) -> GaussianAppend {
     GaussianAppend {
         attributes: attributes(scene),
@@ -118,7 +118,7 @@ pub fn append(scene: &SceneBuffers) -> GaussianAppend {
     }
 }
 
-/// A program that writes what it reads.
+/// A pipeline whose vertex program writes its inputs.
 fn pipeline(device: &Device, with_key: bool) -> Arc<DrawPipeline> {
     let mut builder = Builder::new();
     for slot in 0..NUMBERS as u32 {
@@ -152,7 +152,7 @@ fn pipeline(device: &Device, with_key: bool) -> Arc<DrawPipeline> {
     Arc::new(DrawPipeline::of_gaussians(device.level(), &programs).expect("a pipeline"))
 }
 
-/// A fragment replaces what the attachment holds.
+/// Blending in which a fragment replaces the attachment's contents.
 pub const REPLACE: BlendState = BlendState {
     equations: None,
     write_mask: 0xF,
@@ -163,15 +163,15 @@ pub struct Case<'a> {
     pub state: OracleState,
     pub viewport: OracleViewport,
     pub outputs: &'a [OracleOutputs],
-    /// Parts of them that are draws of their own.
+    /// The parts of them that are separate draws.
     pub draws: Vec<Draw>,
     pub depth: Option<(CompareOp, bool)>,
     pub resolve: Option<GaussianFragmentStage>,
-    /// What is drawn before.
+    /// The draws before.
     pub before: Vec<Draw>,
-    /// Gaussians that the device projects, with the camera that sees them, in place of the draws.
+    /// Gaussians that the device projects, with their camera, in place of the draws.
     pub fixed: Option<(GaussianAppend, Camera)>,
-    /// One for each colour attachment, of which all hold `clear` before.
+    /// The blending of each colour attachment. All attachments are cleared to `clear`.
     pub blend: Vec<BlendState>,
     pub clear: [f32; 4],
     /// The depth attachment's format.
@@ -179,13 +179,13 @@ pub struct Case<'a> {
     pub samples: u32,
 }
 
-/// What became of it.
+/// The results of drawing.
 pub struct Drawn {
-    /// Of the first attachment.
+    /// The colours of the first attachment.
     pub color: Vec<[f32; 4]>,
-    /// Of the others.
+    /// The colours of the other attachments.
     pub others: Vec<Vec<[f32; 4]>>,
-    /// If its format is of binary32.
+    /// The depths, if their format is binary32.
     pub depth: Vec<f32>,
     pub counters: Counters,
 }
@@ -259,7 +259,7 @@ impl Case<'_> {
         }
     }
 
-    /// Draws it over nothing, with depths of one half.
+    /// Draws it over cleared attachments, with depths of one half.
     pub fn run(&self, device: &Arc<Device>) -> Drawn {
         let color = |_: &BlendState| image(Format::R32G32B32A32Sfloat, SIZE, self.samples);
         let colors: Vec<_> = self.blend.iter().map(color).collect();
@@ -366,7 +366,7 @@ impl Case<'_> {
         }
     }
 
-    /// Draws it and holds it against the reference.
+    /// Draws it and compares it with the reference.
     #[track_caller]
     pub fn check(&self, name: &str, device: &Arc<Device>) -> Drawn {
         let drawn = self.run(device);

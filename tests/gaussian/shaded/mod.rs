@@ -1,5 +1,5 @@
-//! Gaussians that a vertex program projects, and fragments that a fragment program makes, as packets to the device,
-//! against the reference given what the vertex program writes.
+//! Gaussians that a vertex program projects, and fragments that a fragment program makes, sent to the device as
+//! packets. They are compared with the reference, which gets the outputs of the vertex program.
 
 mod cloud;
 mod device;
@@ -18,7 +18,7 @@ use simdevice::stats::counters::Counter;
 use simdevice::{Config, Device};
 use std::sync::Arc;
 
-/// One that is not drawn, for each reason.
+/// For each reason of skipping, a Gaussian that is skipped for it.
 fn skipped() -> Vec<(OracleOutputs, SkipReason)> {
     let sound = OracleOutputs {
         position: [0.0, 0.0, 0.5, 1.0],
@@ -71,7 +71,7 @@ fn skipped() -> Vec<(OracleOutputs, SkipReason)> {
         (at([0.0, 0.0, -0.5, -1.0]), near),
         (at([0.0, 0.0, -0.001, 1.0]), near),
         (at([0.0, 0.0, 1.001, 1.0]), SkipReason::Far),
-        // Negative definite, indefinite and half definite.
+        // Negative definite, indefinite and semidefinite.
         (shaped([-4.0, 0.0, -4.0]), degenerate),
         (shaped([4.0, 9.0, 4.0]), degenerate),
         (shaped([4.0, 0.0, -0.3]), degenerate),
@@ -129,12 +129,12 @@ fn modes_keep_the_contract() {
         };
         case.check(&format!("shaded_{name}"), &device);
     }
-    // Without a key the order is that of w.
+    // Without a key, Gaussians are sorted by w.
     let unkeyed: Vec<_> = (outputs.iter())
         .map(|one| OracleOutputs { key: None, ..*one })
         .collect();
     whole(&device, &unkeyed).check("shaded_unkeyed", &device);
-    // Viewports that are upside down, or begin anywhere, move means and nothing else.
+    // Flipped viewports, and viewports with any corner, move only the means.
     for (name, corner, size) in [
         (
             "flipped",
@@ -191,7 +191,7 @@ fn draws_indices_and_instances_make_one_sorted_set() {
         ..whole(&device, &outputs)
     };
     assert!(in_two.run(&device).color == expected.color);
-    // Indices that name every Gaussian in turn, twice, and the order is that of places.
+    // Indices that name every Gaussian twice. The order is that of the positions in the index buffer.
     let indices: Vec<u16> = (0..700).chain((0..700).rev()).collect();
     let indexed = Draw {
         indices: Some(IndexStream {
@@ -211,7 +211,7 @@ fn draws_indices_and_instances_make_one_sorted_set() {
         ..whole(&device, &outputs)
     };
     case.check("shaded_indexed", &device);
-    // An instance draws all again, behind where depths are equal.
+    // A second instance draws all Gaussians again, and is behind the first at equal depths.
     let instances = Draw {
         instance_count: 2,
         ..draw(&device, &outputs, 0, 700)
@@ -291,7 +291,7 @@ fn extreme_values_keep_the_contract() {
         at([f32::MAX, f32::MAX, 0.0, 1e-38]),
         at([1e-39, 1e-39, 1e-39, 2e-39]),
         at([0.0, 0.0, f32::MAX, f32::MAX]),
-        // Everywhere, nowhere, thin, thinner than binary32 can say, and round but for rounding.
+        // Covers everything, covers nothing, thin, thinner than binary32 can represent, and circular up to rounding.
         shaped([1e30, 0.0, 1e30]),
         shaped([f32::MAX, 0.0, f32::MAX]),
         shaped([1e-30, 0.0, 1e-30]),

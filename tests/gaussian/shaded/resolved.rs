@@ -1,4 +1,4 @@
-//! Resolve shaders: what they read is what the reference says of each pixel, and what they write goes where it should.
+//! Resolve shaders: their inputs equal the reference's values of each pixel, and their outputs reach the attachments.
 
 use super::cloud::{cloud, level};
 use super::device::{Case, REPLACE, SIZE, UPRIGHT, append, device, triangle, whole};
@@ -21,7 +21,7 @@ use simdevice::state::{BlendEquation, BlendFactor, BlendOp, BlendState, CompareO
 use simdevice::stats::counters::Counter;
 use std::sync::Arc;
 
-/// Passes its inputs on: four to each attachment in turn.
+/// A fragment program that writes its inputs, four to each attachment in turn.
 fn passing_on(device: &simdevice::Device, inputs: &[FragmentInput]) -> GaussianFragmentStage {
     let mut builder = Builder::new();
     for slot in 0..inputs.len() as u32 {
@@ -62,7 +62,7 @@ fn varying(index: u32) -> FragmentInput {
     }
 }
 
-/// The accumulated colour, then depths and places.
+/// All inputs: the accumulated colour, then depths and positions.
 fn everything() -> [FragmentInput; 8] {
     [
         varying(resolve::ACCUMULATED),
@@ -78,7 +78,7 @@ fn everything() -> [FragmentInput; 8] {
 
 const TOLERANCE: f64 = 5e-6;
 
-/// Whether a pixel lies within the envelope of its outcomes.
+/// True if a value is within the envelope of a pixel's outcomes.
 fn within(ways: &[Resolved], value: f32, of: impl Fn(&Resolved) -> Vec<f64>) -> bool {
     let all = ways.iter().flat_map(of);
     let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
@@ -88,7 +88,7 @@ fn within(ways: &[Resolved], value: f32, of: impl Fn(&Resolved) -> Vec<f64>) -> 
     low - TOLERANCE <= value && value <= high + TOLERANCE
 }
 
-/// Holds what a program passed on against the reference; returns how many pixels were covered.
+/// Compares the inputs that a program wrote with the reference; returns the number of covered pixels.
 #[track_caller]
 fn check(name: &str, ways: &[Vec<Resolved>], color: &[[f32; 4]], shown: &[[f32; 4]]) -> usize {
     let mut covered = 0;
@@ -165,7 +165,7 @@ fn depths_are_rounded_to_the_attachment_and_tested() {
     };
     let drawn = case.run(&device);
     check("tested", &ways, &drawn.color, &drawn.others[0]);
-    // What is stored is the median that was read.
+    // The stored depth is the median that the program read.
     for (shown, stored) in std::iter::zip(&drawn.others[0], &drawn.depth) {
         let expected = if *shown == [-1.0; 4] { 0.5 } else { shown[1] };
         assert_eq!(*stored, expected);
@@ -209,7 +209,7 @@ fn what_a_program_writes_is_blended() {
     let plain = case(None).run(&device);
     let shaded = case(Some(passing_on(&device, &accumulated))).run(&device);
     assert!(plain.color == shaded.color);
-    // The second attachment is only written by a program.
+    // Only a program writes the second attachment.
     assert!(
         plain.others[0]
             .iter()
@@ -237,7 +237,7 @@ fn what_a_program_writes_is_blended() {
             assert_eq!((&some[..3], some[3]), (&all[..3], 1.0));
             kept += 1;
         } else {
-            // What is taken away leaves depths, too, and is not counted.
+            // Discarded fragments write no depth either, and are not counted.
             assert_eq!(*some, [0.5, 0.25, 0.125, 1.0]);
             assert_eq!(by_alpha.depth[index], 0.5);
         }
@@ -274,7 +274,7 @@ fn samples_share_invocations_unless_each_is_shaded() {
         if shared[3] == 0.0 {
             continue;
         }
-        // The mean of the samples' places is the centre, and all are alike in the rest.
+        // The mean of the sample positions is the centre, and all other inputs are equal.
         assert_eq!(shared[..2], each[..2]);
         assert_eq!(shared[2], (index as u32 % SIZE[0]) as f32 + 0.5);
         assert!((shared[2] - each[2]).abs() < 1e-4);
@@ -301,7 +301,7 @@ fn samples_that_differ_are_shaded_for_themselves() {
         |drawn: &super::device::Drawn| drawn.counters.get(Counter::FragmentInvocations);
     assert!(shared.color == each.color && shared.others == each.others);
     let samples = invocations(&each);
-    // Most pixels have samples that agree, and some at the triangle's edges have not.
+    // In most pixels all samples agree, and in some at the triangle's edges they do not.
     let flat = Case {
         before: Vec::new(),
         ..case(false)

@@ -1,4 +1,4 @@
-//! Attributes as trained files hold them.
+//! Attributes in the form of trained files: logarithms of scales and logits of opacities.
 
 use super::bench::{Options, Pipeline, SIZE, State, Stream, extension, pictures};
 use crate::gaussian::SKULL;
@@ -15,13 +15,13 @@ use gaurast_tests::oracle::{OracleCamera, OracleState, render_bounded};
 use gaurast_tests::scenes::{self, SceneBuffers};
 use std::collections::HashMap;
 
-/// Attributes before their functions are applied.
+/// Attributes before the activation functions are applied.
 struct Stored {
     logarithms: Vec<[f32; 3]>,
     logits: Vec<f32>,
 }
 
-/// What attributes mean with both flags.
+/// The activated attributes, with both functions.
 fn activated(scene: &SceneBuffers, stored: &Stored) -> SceneBuffers {
     let scales = stored.logarithms.iter();
     SceneBuffers {
@@ -36,7 +36,7 @@ fn activated(scene: &SceneBuffers, stored: &Stored) -> SceneBuffers {
     }
 }
 
-/// The picture of a scene whose scales and opacities are `stored`, as flags say.
+/// The picture of a scene whose scales and opacities are `stored`, with the given flags.
 fn draw(
     scene: &SceneBuffers,
     stored: &Stored,
@@ -60,7 +60,7 @@ fn draw(
     all.remove(0)
 }
 
-/// The floats of a binary PLY file's vertices, by property.
+/// The floats of a binary PLY file's vertices, by property name.
 fn properties(bytes: &[u8]) -> HashMap<String, Vec<f32>> {
     let end = b"end_header\n";
     let start = bytes
@@ -84,7 +84,7 @@ fn properties(bytes: &[u8]) -> HashMap<String, Vec<f32>> {
     names.iter().enumerate().map(column).collect()
 }
 
-/// A trained file's values go in as they are.
+/// A trained file's values are used without conversion.
 #[gaurast_runner::test(needs = [Need::Data(SKULL)])]
 fn a_trained_file_is_drawn_as_it_is_stored() {
     let scene = gaurast_scene::open(data(SKULL)).expect("a scene");
@@ -107,8 +107,8 @@ fn a_trained_file_is_drawn_as_it_is_stored() {
     assert_contract("the skull", &picture, &expected, Limits::ENVELOPE_ONLY);
 }
 
-/// Each flag alone and both, for volumes and discs; infinite logarithms and logits are scales of nothing and opacities of
-/// nothing and one, and others than numbers are skipped.
+/// Each flag alone and both, for volumes and discs. A logarithm of minus infinity gives a scale of zero, an infinite
+/// logit gives an opacity of zero or one, and Gaussians with other non-finite results are skipped.
 #[gaurast_runner::test]
 fn flags_are_the_functions_before() {
     let camera = scenes::camera(SIZE[0], SIZE[1]).to_vulkan();

@@ -1,6 +1,6 @@
-//! Vertex streams, pipelines and pictures with layers, on a device that has all features.
+//! Vertex streams, pipelines and pictures with layers, on a device with all features.
 //!
-//! `unsafe` has the reason that it has in `gaurast_testkit`.
+//! The safety of `unsafe` is explained in `gaurast_testkit`.
 
 use crate::triangles::devices::own;
 use ash::vk;
@@ -28,7 +28,7 @@ pub struct Stream {
 }
 
 impl Stream {
-    /// A buffer of one attribute by vertex, whose elements follow one another.
+    /// A buffer of one attribute that advances by vertex and is tightly packed.
     pub fn new<T: bytemuck::Pod>(location: u32, format: vk::Format, elements: &[T]) -> Self {
         Self {
             buffer: Buffer::of(own(), elements),
@@ -38,7 +38,7 @@ impl Stream {
         }
     }
 
-    /// The rows of a matrix and a number by instance, at four locations.
+    /// A buffer of matrix rows and a number that advances by instance, at four locations.
     pub fn of_instances(location: u32, instances: &[[f32; 13]]) -> Self {
         let four = vk::Format::R32G32B32A32_SFLOAT;
         Self {
@@ -53,7 +53,7 @@ impl Stream {
         }
     }
 
-    /// The attributes of a scene: position, scale, rotation, opacity, harmonics, from location 0 on.
+    /// The attributes of a scene: position, scale, rotation, opacity, harmonics, starting at location 0.
     pub fn of(scene: &SceneBuffers) -> Vec<Self> {
         let triple = vk::Format::R32G32B32_SFLOAT;
         let count = (scene.degree + 1).pow(2);
@@ -82,13 +82,13 @@ pub fn locations() -> GaussianAttributeLocationsGAURAST {
         .first_spherical_harmonics(4)
 }
 
-/// What a [`Pipeline`] is made of.
+/// The options of a [`Pipeline`].
 #[derive(Clone)]
 pub struct Options<'a> {
     pub state: State,
     pub approximation: Option<PipelineGaussianApproximationStateCreateInfoGAURAST<'static>>,
     pub view_mask: u32,
-    /// Dynamic states beside viewport and scissor.
+    /// Dynamic states in addition to viewport and scissor.
     pub dynamic: Vec<vk::DynamicState>,
     pub bindings: Option<&'a Bindings>,
     /// A resolve shader in GLSL.
@@ -96,7 +96,7 @@ pub struct Options<'a> {
 }
 
 impl Options<'_> {
-    /// Draws scenes of a degree.
+    /// Options for drawing scenes of a degree.
     pub fn new(state: State, degree: u32) -> Self {
         Self {
             state: state
@@ -111,7 +111,7 @@ impl Options<'_> {
     }
 }
 
-/// A pipeline that replaces what a target of 32-bit floats holds.
+/// A pipeline that replaces the contents of a target of 32-bit floats.
 pub struct Pipeline {
     raw: vk::Pipeline,
     layout: vk::PipelineLayout,
@@ -211,7 +211,7 @@ impl Pipeline {
         }
     }
 
-    /// Binds it and its vertex buffers, and its descriptors.
+    /// Binds the pipeline, its vertex buffers and its descriptors.
     pub fn bind(&self, commands: &Commands, streams: &[Stream], bindings: Option<&Bindings>) {
         let (device, point) = (commands.device(), vk::PipelineBindPoint::GRAPHICS);
         for (binding, stream) in (0..).zip(streams) {
@@ -243,7 +243,7 @@ pub fn extension() -> &'static gaussian_primitive_topology::Device {
     own().gaussian().expect("a device that draws Gaussians")
 }
 
-/// The pictures of a pass over `layers` layers, of which `view_mask` are views, that are transparent at its beginning.
+/// The pictures of a pass over `layers` layers, which are cleared to transparent. `view_mask` selects the views.
 pub fn pictures(layers: u32, view_mask: u32, draw: impl FnOnce(&Commands)) -> Vec<Vec<[f32; 4]>> {
     let gpu: &Gpu = own();
     let format = vk::Format::R32G32B32A32_SFLOAT;

@@ -1,4 +1,4 @@
-//! One pipeline whose dynamic states are all set is each pipeline that has their values.
+//! Dynamic states: a pipeline with all of them gives the same pictures as pipelines with fixed values.
 
 use super::bench::{Options, Pipeline, SIZE, State, Stream, extension, pictures};
 use ash::vk;
@@ -34,7 +34,7 @@ const ALL: [vk::DynamicState; 9] = [
 /// The degree of the scene, and of the pipeline with dynamic states.
 const DEGREE: u32 = 3;
 
-/// Values of all dynamic states, the degree in that of the state.
+/// Values of all dynamic states. The degree is in the state.
 type Values = (State, Approximation);
 
 fn settings() -> [Values; 6] {
@@ -110,7 +110,7 @@ fn every_dynamic_state_in_one_pipeline_is_static_pipelines() {
         });
         all.remove(0)
     };
-    // What the pipeline itself says of a dynamic state is ignored, be it valid or not.
+    // The pipeline's own values of dynamic states are ignored, even if they are invalid.
     let ignored = State::default().alpha_floor(7.0).low_pass_variance(-1.0);
     let dynamic = Pipeline::new(
         &streams,
@@ -148,7 +148,7 @@ fn every_dynamic_state_in_one_pipeline_is_static_pipelines() {
         }
         drawn.push(picture);
     }
-    // Each setting shows, and the last is the first again.
+    // Each setting has an effect, and the last setting equals the first.
     assert!(drawn[5] == drawn[0]);
     for number in 1..5 {
         assert!(drawn[number] != drawn[0], "{number}");

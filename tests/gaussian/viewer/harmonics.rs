@@ -1,4 +1,4 @@
-//! Spherical harmonics from a buffer by its address.
+//! Spherical harmonics in a buffer that is given by its address.
 
 use super::bench::{Options, Pipeline, SIZE, State, Stream, extension, pictures};
 use crate::triangles::devices::own;
@@ -15,11 +15,11 @@ use gaurast_tests::scenes;
 type Picture = Vec<[f32; 4]>;
 type Harmonics = GaussianSphericalHarmonicsBufferGAURAST<'static>;
 
-/// A buffer with an address.
+/// A buffer with a device address.
 struct Addressed {
     raw: vk::Buffer,
     memory: vk::DeviceMemory,
-    /// All of it, without format and strides.
+    /// The whole buffer, without format and strides.
     harmonics: Harmonics,
 }
 
@@ -31,7 +31,7 @@ impl Addressed {
             .size(bytes.len() as u64)
             .usage(Usage::STORAGE_BUFFER | Usage::SHADER_DEVICE_ADDRESS);
         let host = vk::MemoryPropertyFlags::HOST_VISIBLE | vk::MemoryPropertyFlags::HOST_COHERENT;
-        // SAFETY: see the bench; the mapping has room for the bytes.
+        // SAFETY: see the bench; the mapping is large enough for the bytes.
         unsafe {
             let raw = device.create_buffer(&info, None).expect("a buffer");
             let needed = device.get_buffer_memory_requirements(raw);
@@ -118,7 +118,7 @@ fn in_buffer(degree: u32) -> Options<'static> {
     options
 }
 
-/// Interleaved by Gaussian, by coefficient, and as half floats: attributes give the same picture.
+/// Harmonics interleaved by Gaussian, by coefficient, and as half floats give the same picture as attributes.
 #[gaurast_runner::test]
 fn a_buffer_is_attributes() {
     let degree = 2;
@@ -152,7 +152,7 @@ fn a_buffer_is_attributes() {
         .coefficient_stride(12 * count as u64);
     let picture = drawn(&streams, &options, Some(&planar), count as u32, 1);
     assert!(picture == by_attributes);
-    // What lies beyond the size is zero.
+    // Reads beyond the size give zero.
     let cut = drawn(
         &streams,
         &options,
@@ -167,7 +167,7 @@ fn a_buffer_is_attributes() {
     assert_contract("cut", &cut, &expected, Limits::ENVELOPE_ONLY);
 }
 
-/// Degree 4 with a model matrix and a factor of the opacity, which would take 33 attributes.
+/// Degree 4 with a model matrix and an opacity factor works; as attributes it would need 33.
 #[gaurast_runner::test]
 fn degree_4_goes_with_a_matrix_and_a_factor() {
     let degree = 4;

@@ -1,5 +1,5 @@
-//! What viewers need: a camera for each view, sets with a beginning and an end, sliders that are dynamic states, attributes
-//! as trained files hold them, and picking. Each is held against the oracle.
+//! Features that viewers need: a camera for each view, sets with a beginning and an end, dynamic states, attributes in
+//! the form of trained files, and picking. Each is compared with the oracle.
 
 mod activation;
 mod bench;

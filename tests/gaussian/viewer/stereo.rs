@@ -1,4 +1,4 @@
-//! One pass draws every view through its own camera.
+//! Multiview: one pass draws every view through its own camera.
 
 use super::bench::{Options, Pipeline, SIZE, State, Stream, extension, pictures};
 use crate::GLSLANG;
@@ -46,7 +46,7 @@ fn single(streams: &[Stream], count: u32, options: &Options<'_>, camera: &Camera
     all.remove(0)
 }
 
-/// Asserts that a picture is not empty.
+/// Checks that a picture is not empty.
 fn is_drawn(picture: &Picture) {
     let covered = picture.iter().filter(|pixel| pixel[3] > 0.1).count();
     assert!(covered > picture.len() / 20, "{covered}");
@@ -56,7 +56,7 @@ fn scene() -> SceneBuffers {
     scenes::cloud(71, 1200, 2)
 }
 
-/// A stereo pair in one pass is two single passes bit for bit, and within the oracle's envelope.
+/// A stereo pair in one pass equals two single passes bit for bit, and is within the oracle's envelope.
 #[gaurast_runner::test]
 fn a_stereo_pair_in_one_pass_is_two_single_passes() {
     let scene = scene();
@@ -95,7 +95,7 @@ fn a_stereo_pair_in_one_pass_is_two_single_passes() {
     }
 }
 
-/// Views are numbered by the bits of the mask, and one camera is all views'.
+/// A view's number is its bit in the mask. A single camera is used for all views.
 #[gaurast_runner::test]
 fn a_view_sees_through_the_camera_of_its_index() {
     let scene = scene();
@@ -175,7 +175,7 @@ fn a_uniform_buffer_has_a_camera_for_each_view() {
     }
 }
 
-/// A resolve shader knows its view.
+/// A resolve shader can read its view index.
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn a_resolve_shader_runs_for_each_view() {
     let scene = scene();

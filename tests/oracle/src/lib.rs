@@ -1,5 +1,5 @@
-//! What tests and benchmarks hold pictures of Gaussians against: the reference renderer in binary64, how different two
-//! pictures are, and generated scenes.
+//! The references that tests and benchmarks compare pictures of Gaussians with: a renderer in binary64, measures of the
+//! difference between two pictures, and generated scenes.
 //!
 //! A verdict on a picture of any renderer:
 //!

@@ -1,4 +1,4 @@
-//! A running test: its variant, its real data, its process.
+//! A running test: its variant, its shard, its process.
 
 use std::ffi::OsString;
 use std::process::Command;
@@ -6,12 +6,12 @@ use std::sync::OnceLock;
 
 use crate::need::{Ignored, Missing, Need, ignore};
 
-/// One of the forms that a test runs in: its name stands behind the test's.
+/// One of the forms in which a test runs. Its name is appended to the test's name.
 #[derive(Clone, Debug)]
 pub struct Variant {
     /// The variant's name.
     pub name: String,
-    /// The things that this variant can't do without, beside the test's own.
+    /// Requirements of this variant, in addition to the test's own.
     pub needs: Vec<Need>,
 }
 
@@ -25,7 +25,8 @@ impl Variant {
     }
 }
 
-/// A variant for each SIMD level, by the names that `GAURAST_SIMD` takes. What the processor lacks is ignored, in view.
+/// A variant for each SIMD level, with the names of `GAURAST_SIMD`. A level that the processor lacks is ignored and
+/// reported.
 pub fn simd_levels() -> Vec<Variant> {
     crate::SIMD_LEVELS
         .map(|level| Variant {
@@ -35,7 +36,7 @@ pub fn simd_levels() -> Vec<Variant> {
         .into()
 }
 
-/// Variants that share a test's work by [`Case::shard`].
+/// Variants that divide a test's work by [`Case::shard`].
 pub fn shards(count: usize) -> Vec<Variant> {
     (1..=count)
         .map(|index| Variant::new(format!("{index} of {count}")))
@@ -52,19 +53,19 @@ pub struct Shard {
 }
 
 impl Shard {
-    /// Reports whether the `item`th piece of work is this part's.
+    /// Returns true if item number `item` of the work belongs to this part.
     pub fn has(self, item: usize) -> bool {
         item % self.count == self.index
     }
 
-    /// This part's share of `total` pieces of work, in a row: the first one and their number.
+    /// This part's contiguous share of `total` items.
     pub fn range(self, total: u64) -> std::ops::Range<u64> {
         let at = |index: usize| total * index as u64 / self.count as u64;
         at(self.index)..at(self.index + 1)
     }
 }
 
-/// The environment as it is at the first call. Tests that run beside another may change it for a while.
+/// The environment at the first call. Tests that run at the same time may change it temporarily.
 pub(crate) fn first_environment() -> &'static [(OsString, OsString)] {
     static FIRST: OnceLock<Vec<(OsString, OsString)>> = OnceLock::new();
     FIRST.get_or_init(|| std::env::vars_os().collect())
@@ -77,9 +78,9 @@ pub struct Case {
     pub(crate) variant: Option<String>,
 }
 
-/// Set for a test's own process: the name of the test.
+/// The variable that holds the test's name in the test's own process.
 const ALONE: &str = "GAURAST_TEST_ALONE";
-/// Begins the line by which a test's own process says that the test is ignored, and for want of what.
+/// The beginning of the line by which a test's own process reports that the test is ignored; the reason follows.
 const IGNORED: &str = "gaurast-runner: ignored: ";
 
 impl Case {
@@ -109,12 +110,12 @@ impl Case {
         }
     }
 
-    /// Reports whether this process is the test's own.
+    /// Returns true if this process belongs to the test alone.
     pub fn is_alone(&self) -> bool {
         std::env::var_os(ALONE).is_some_and(|name| name == *self.name)
     }
 
-    /// A command that runs this test again in a process of its own, in the environment that this process began with.
+    /// A command that runs this test again in a process of its own, with the initial environment of this process.
     pub fn command(&self) -> Command {
         let mut command = Command::new(std::env::current_exe().expect("the test's own path"));
         command
@@ -126,11 +127,11 @@ impl Case {
         command
     }
 
-    /// Runs this test again by [`Self::command`], to whose environment `set_up` may add. Ends the test as ignored if it is
-    /// ignored there.
+    /// Runs this test again by [`Self::command`]; `set_up` may add to its environment. If the test is ignored there, it
+    /// is ignored here too.
     ///
     /// # Panics
-    /// If the test fails there, with what the process printed.
+    /// If the test fails there; the message has the output of the process.
     pub fn run_alone(&self, set_up: impl FnOnce(&mut Command)) {
         let mut command = self.command();
         set_up(&mut command);
@@ -149,7 +150,7 @@ impl Case {
         assert!(text.contains(" 1 passed"), "the test did not run:\n{text}");
     }
 
-    /// Tells the process that waits for this one that the test is ignored.
+    /// Reports to the waiting parent process that the test is ignored.
     pub(crate) fn say_ignored(&self, ignored: &Ignored) {
         if self.is_alone() {
             println!("\n{IGNORED}{:?} {}", ignored.missing, ignored.reason);

@@ -1,10 +1,10 @@
 //! The runner of the project's tests.
 //!
-//! It looks and answers like Rust's own, on top of `libtest-mimic`, and knows more of a test: what it needs of the
-//! machine, so that one that can't run is *ignored*, with the reason, and never passes empty; variants that it runs in;
-//! and a process of its own.
+//! It has the command line and the output of Rust's own test runner, and is built on `libtest-mimic`. In addition, a
+//! test declares its requirements, its variants, and if it runs in a process of its own. A test whose requirements are
+//! missing is *ignored*, with the reason, and does not count as passed.
 //!
-//! An executable of tests has `harness = false` and this `main`:
+//! A test executable has `harness = false` and this `main`:
 //!
 //! ```no_run
 //! fn main() -> std::process::ExitCode {
@@ -20,17 +20,17 @@
 //! }
 //! ```
 //!
-//! The environment says what must be there:
+//! Environment variables configure the runner:
 //!
 //! | variable | meaning |
 //! |---|---|
-//! | `GAURAST_TEST_DATA` | the folder of real data: splat files, meshes, cameras |
+//! | `GAURAST_TEST_DATA` | the folder of test data: splat files, meshes, cameras |
 //! | `GAURAST_VK_XML` | the Vulkan registry's `vk.xml`, which `driver/gen/fetch.sh` gets |
 //! | `GAURAST_SPIRV_GRAMMAR` | SPIR-V's `spirv.core.grammar.json`, which `driver/gen/fetch.sh` gets |
-//! | `GAURAST_TEST_REQUIRE` | `programs`: a missing program or system file is a failure; `all`: missing data, too |
-//! | `GAURAST_TEST_LONG` | `1`: tests that have a small sample run whole |
+//! | `GAURAST_TEST_REQUIRE` | `programs`: a missing program or system file is a failure; `all`: missing data too |
+//! | `GAURAST_TEST_LONG` | `1`: tests that use a small sample by default run completely |
 //! | `GAURAST_TEST_LIBRARIES` | the folder of shared libraries that were built with the tests |
-//! | `GAURAST_TEST_REPORT` | a file that seconds of tests and reasons of ignored ones are appended to |
+//! | `GAURAST_TEST_REPORT` | a file to which the times of tests and the reasons of ignored ones are appended |
 
 mod case;
 mod library;
@@ -56,26 +56,26 @@ pub use need::{
 };
 use report::Report;
 
-/// A test, as its attribute registers it.
+/// A registered test.
 #[derive(Debug)]
 pub struct Test {
     /// The path of the test's module.
     pub module: &'static str,
     /// The name of the test's function.
     pub name: &'static str,
-    /// Makes the list of things that the test can't do without.
+    /// A function that lists the test's requirements.
     pub needs: fn() -> Vec<Need>,
-    /// Makes the list of variants that the test runs in.
+    /// A function that lists the test's variants.
     pub each: Option<fn() -> Vec<Variant>>,
-    /// The test runs in a process of its own.
+    /// True if the test runs in a process of its own.
     pub alone: bool,
-    /// The test.
+    /// The test's function.
     pub run: fn(&Case),
 }
 
 inventory::collect!(Test);
 
-/// The missing things that are failures.
+/// The kinds of missing requirements that are failures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Requirement {
     None,
@@ -106,7 +106,7 @@ impl Requirement {
     }
 }
 
-/// Runs the executable's tests as the command line says, which is that of Rust's own runner.
+/// Runs the executable's tests. The command line is that of Rust's own runner.
 pub fn main() -> ExitCode {
     case::first_environment();
     let arguments = Arguments::from_args();
@@ -118,7 +118,7 @@ pub fn main() -> ExitCode {
         }
     };
     let mut tests: Vec<&Test> = inventory::iter::<Test>.into_iter().collect();
-    // Tests with a process of their own take longest: they begin first, so that none is left for last.
+    // Tests with a process of their own take longest, so they begin first.
     tests.sort_by_key(|test| (!test.alone, test.module, test.name));
     let report = Arc::new(Report::default());
     let mut trials = Vec::new();
@@ -154,7 +154,7 @@ pub fn main() -> ExitCode {
     conclusion.exit_code()
 }
 
-/// Makes a trial of a test's variant.
+/// Makes a trial of one variant of a test.
 fn trial(
     test: &'static Test,
     case: Case,
@@ -164,7 +164,7 @@ fn trial(
     report: &Arc<Report>,
 ) -> Trial {
     let missing = move || needs.iter().find_map(|need| need.missing());
-    // Programs that list tests first, and run them one by one, see here what will be ignored.
+    // Programs that list the tests before running them must see which ones will be ignored.
     let is_ignored =
         arguments.list && missing().is_some_and(|ignored| !requirement.forbids(ignored.missing));
     let report = Arc::clone(report);
@@ -194,7 +194,7 @@ fn trial(
     .with_ignored_flag(is_ignored)
 }
 
-/// Runs a test, and tells if it ended itself as ignored.
+/// Runs a test; returns an error if the test ended itself as ignored.
 fn run(test: &Test, case: &Case) -> Result<(), Ignored> {
     let outcome = catch_unwind(AssertUnwindSafe(|| {
         if test.alone && !case.is_alone() {

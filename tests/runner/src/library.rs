@@ -4,16 +4,16 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Mutex;
 
-/// A folder of shared libraries that were built with the tests.
+/// The variable for the folder of shared libraries that were built with the tests.
 const LIBRARIES: &str = "GAURAST_TEST_LIBRARIES";
 
 /// The path of a package's shared library in the profile of this executable.
 ///
-/// Cargo builds no shared library for the sake of a test. It is that of the folder which `GAURAST_TEST_LIBRARIES` names,
-/// where whoever runs the tests built it with them; else this has cargo build it.
+/// Cargo does not build a shared library for a test. The library is taken from the folder that `GAURAST_TEST_LIBRARIES`
+/// names, if it is set; otherwise this function runs cargo to build it.
 ///
 /// # Panics
-/// If the build fails, with what it printed.
+/// If the build fails; the message has its output.
 pub fn built_library(package: &str, file: &str) -> PathBuf {
     static ONE_BUILD: Mutex<()> = Mutex::new(());
     if let Some(built) = std::env::var_os(LIBRARIES) {

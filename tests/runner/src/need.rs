@@ -1,16 +1,16 @@
-//! Needs of a test: programs, files, data, capabilities; and the end of a test where one is missing.
+//! Requirements of tests: programs, files, data, capabilities; and the end of a test if one is missing.
 
 use std::panic::resume_unwind;
 use std::path::{Path, PathBuf};
 
-/// A thing that a test can't do without.
+/// A requirement of a test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Need {
     /// A program on the `PATH`.
     Program(&'static str),
     /// A file of the system, by its absolute path.
     File(&'static str),
-    /// A file that an environment variable names.
+    /// A file whose path is in an environment variable.
     FileOf(&'static str),
     /// The Vulkan loader, a shared library.
     VulkanLoader,
@@ -18,31 +18,31 @@ pub enum Need {
     Lavapipe,
     /// The Khronos validation layer, by its manifest, and the loader that finds it.
     ValidationLayer,
-    /// A file or a folder within the folder of real data, [`data_folder`].
+    /// A file or a folder in the folder of test data, [`data_folder`].
     Data(&'static str),
-    /// A SIMD level of the processor, as `GAURAST_SIMD` names it.
+    /// A SIMD level of the processor, by its name in `GAURAST_SIMD`.
     SimdLevel(&'static str),
 }
 
-/// A thing that is missing, by who can bring it.
+/// A missing requirement, by the way in which it can be provided.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Missing {
-    /// A program, a library or a file that a package brings: `GAURAST_TEST_REQUIRE=programs` makes it a failure.
+    /// A program, a library or a file of a package: `GAURAST_TEST_REQUIRE=programs` makes it a failure.
     Program,
-    /// Real data: `GAURAST_TEST_REQUIRE=all` makes it a failure.
+    /// Test data: `GAURAST_TEST_REQUIRE=all` makes it a failure.
     Data,
-    /// A capability of the processor or of another implementation: never a failure.
+    /// A capability of the processor or of another implementation, which is never a failure.
     Capability,
 }
 
-/// The panic's payload of a test that can't run.
+/// The panic payload of a test that is ignored.
 pub(crate) struct Ignored {
     pub missing: Missing,
     pub reason: String,
 }
 
-/// Ends the running test as ignored, or as failed where `GAURAST_TEST_REQUIRE` says so. To be called in the test's own
-/// thread.
+/// Ends the running test as ignored, or as failed if `GAURAST_TEST_REQUIRE` says so. It must be called in the test's
+/// own thread.
 pub fn ignore(missing: Missing, reason: impl Into<String>) -> ! {
     resume_unwind(Box::new(Ignored {
         missing,
@@ -57,14 +57,14 @@ pub fn require(need: Need) {
     }
 }
 
-/// The folder of real data, which `GAURAST_TEST_DATA` names.
+/// The folder of test data, which `GAURAST_TEST_DATA` names.
 pub fn data_folder() -> Option<PathBuf> {
     let folder = std::env::var_os("GAURAST_TEST_DATA")?;
     (!folder.is_empty()).then(|| folder.into())
 }
 
-/// The path of a file or folder of the real data, given relative to [`data_folder`]. Ends the running test as ignored
-/// where it is missing.
+/// The path of a file or folder of the test data, relative to [`data_folder`]. Ends the running test as ignored if it
+/// is missing.
 pub fn data(name: &'static str) -> PathBuf {
     require(Need::Data(name));
     data_folder()
@@ -72,13 +72,13 @@ pub fn data(name: &'static str) -> PathBuf {
         .join(name)
 }
 
-/// Reports whether `GAURAST_TEST_LONG` asks for whole runs where a test has a small sample.
+/// Returns true if `GAURAST_TEST_LONG` requests complete runs in place of small samples.
 pub fn is_long() -> bool {
     std::env::var_os("GAURAST_TEST_LONG").is_some_and(|value| value == "1")
 }
 
 impl Missing {
-    /// The kind of that name.
+    /// The kind with this name.
     pub(crate) fn from_name(name: &str) -> Self {
         [Self::Program, Self::Data, Self::Capability]
             .into_iter()
@@ -88,7 +88,7 @@ impl Missing {
 }
 
 impl Need {
-    /// The reason if it is missing.
+    /// The reason for ignoring the test, if the requirement is missing.
     pub(crate) fn missing(self) -> Option<Ignored> {
         let (missing, reason) = match self {
             Self::Program(name) if !on_the_path(name) => {
@@ -130,13 +130,13 @@ fn is_file(path: std::ffi::OsString) -> bool {
     Path::new(&path).is_file()
 }
 
-/// The SIMD levels of the device, by the names that `GAURAST_SIMD` takes, the simplest first.
+/// The names of the device's SIMD levels in `GAURAST_SIMD`, the simplest first.
 pub const SIMD_LEVELS: [&str; 3] = ["sse2", "avx2", "avx512"];
 
-/// Reports whether the processor has a SIMD level.
+/// Returns true if the processor has a SIMD level.
 pub fn has_simd_level(level: &str) -> bool {
     #[cfg(target_arch = "x86_64")]
-    // The features that the levels are named after stand for all that each needs.
+    // The feature that a level is named after stands for all features that it needs.
     match level {
         "sse2" => true,
         "avx2" => std::arch::is_x86_feature_detected!("avx2"),
@@ -149,7 +149,7 @@ pub fn has_simd_level(level: &str) -> bool {
     }
 }
 
-/// Lavapipe's manifest, where Linux systems keep those of drivers.
+/// Lavapipe's manifest in the folders where Linux systems store drivers' manifests.
 pub fn lavapipe_manifest() -> Option<PathBuf> {
     const FOLDERS: [&str; 3] = [
         "/usr/share/vulkan/icd.d",
@@ -183,7 +183,7 @@ fn has_vulkan_loader() -> bool {
     first_file(&folders, |name| name.starts_with("libvulkan.so")).is_some()
 }
 
-/// The first file with a fitting name in any of `folders`.
+/// The first file in `folders` whose name matches.
 fn first_file(folders: &[&str], fits: impl Fn(&str) -> bool) -> Option<PathBuf> {
     let entries = folders
         .iter()

@@ -1,18 +1,18 @@
-//! The report of a run beside its results: the slowest tests, and the reasons of those that were ignored.
+//! The report of a run: the slowest tests, and the reasons for which tests were ignored.
 
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
-/// A file to which each executable appends its rows (seconds or `ignored`, a tab, the test's name or the reason), so that
-/// a script can tell of all of them together.
+/// The variable for a file to which each executable appends its rows: seconds or `ignored`, a tab, and the test's name
+/// or the reason. A script can then report on all executables together.
 pub(crate) const REPORT: &str = "GAURAST_TEST_REPORT";
 
-/// The number of slowest tests that are told.
+/// The number of slowest tests that are printed.
 const SLOWEST: usize = 20;
 
-/// The times and reasons of a run.
+/// The times of tests and the reasons of ignored ones.
 #[derive(Debug, Default)]
 pub(crate) struct Report {
     times: Mutex<Vec<(Duration, String)>>,

@@ -1,10 +1,10 @@
-//! The runner, held by tests that start themselves again where something is missing.
+//! Tests of the runner, which start themselves again with something missing.
 
 use std::process::{Command, ExitCode, Output};
 
 use gaurast_runner::{Case, Missing, Need, Variant, ignore, shards};
 
-/// Set for the process that a test starts to look at.
+/// The variable that is set in the process that a test starts and observes.
 const OBSERVED: &str = "GAURAST_RUNNER_OBSERVED";
 
 fn main() -> ExitCode {
@@ -15,12 +15,12 @@ fn is_observed() -> bool {
     std::env::var_os(OBSERVED).is_some()
 }
 
-/// A need of the observed process only.
+/// A requirement that exists only in the observed process.
 fn if_observed(need: Need) -> Vec<Need> {
     is_observed().then_some(need).into_iter().collect()
 }
 
-/// Runs the test again, with `arguments` and a requirement.
+/// Runs the test again with `arguments` and a value of `GAURAST_TEST_REQUIRE`.
 fn observe(case: &Case, requirement: &str, arguments: &[&str]) -> (Output, String) {
     let output = Command::new(std::env::current_exe().expect("a path"))
         .args(["--exact", case.name()])
@@ -35,8 +35,8 @@ fn observe(case: &Case, requirement: &str, arguments: &[&str]) -> (Output, Strin
     (output, text)
 }
 
-/// Holds the observed process to being ignored for `reason` without a requirement and under those of `allowed`, and to
-/// failing for it under those of `forbidden`.
+/// Checks that the observed process is ignored for `reason` without a value of `GAURAST_TEST_REQUIRE` and with those in
+/// `allowed`, and that it fails with those in `forbidden`.
 fn assert_ignored(case: &Case, reason: &str, allowed: &[&str], forbidden: &[&str]) {
     for requirement in [""].iter().chain(allowed) {
         let (output, text) = observe(case, requirement, &[]);
@@ -119,7 +119,7 @@ fn a_test_alone_sees_nothing_of_what_others_do_to_the_environment(case: &Case) {
         assert_eq!(std::env::var("GAURAST_RUNNER_GIVEN").as_deref(), Ok("1"));
         return;
     }
-    // SAFETY: all that runs beside it reads the environment through the standard library.
+    // SAFETY: all other threads read the environment through the standard library.
     unsafe { std::env::set_var(CHANGED, "1") };
     case.run_alone(|command| {
         command.env("GAURAST_RUNNER_GIVEN", "1");

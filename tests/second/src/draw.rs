@@ -1,4 +1,4 @@
-//! Steps 6 and 7, depth, and what reaches the attachments.
+//! Steps 6 and 7, depth, and the values written to the attachments.
 
 use std::ops::Range;
 
@@ -6,7 +6,7 @@ use crate::linear::{Vector, widened};
 use crate::project::{Camera, Gaussian, Projected, State, project};
 use crate::viewport::Viewport;
 
-/// A comparison of a Gaussian's depth with the one that is stored.
+/// A comparison of a Gaussian's depth with the stored one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub enum CompareOp {
@@ -66,7 +66,7 @@ impl DepthFormat {
 pub struct DepthTest {
     /// The comparison.
     pub compare: CompareOp,
-    /// The median depth is stored.
+    /// True if the median depth is stored.
     pub write: bool,
     /// The attachment's format.
     pub format: DepthFormat,
@@ -83,7 +83,7 @@ pub struct Attachments {
     pub depth: Vec<f64>,
 }
 
-/// What a pixel has accumulated.
+/// The accumulated state of a pixel.
 #[derive(Clone, Copy, Debug)]
 struct Pixel {
     color: Vector,
@@ -93,9 +93,9 @@ struct Pixel {
     median: Option<f64>,
 }
 
-/// Draws one sorted set, and blends its fragments "over" what the colour attachment holds.
+/// Draws one sorted set, and blends its fragments "over" the contents of the colour attachment.
 ///
-/// Without a depth test the depth attachment is left alone.
+/// Without a depth test the depth attachment does not change.
 pub fn draw(
     gaussians: &[Gaussian<'_>],
     camera: &Camera,
@@ -160,14 +160,14 @@ pub fn draw(
                 {
                     continue;
                 }
-                // 6
+                // Step 6.
                 let d = [x as f64 + 0.5 - mean[0], y as f64 + 0.5 - mean[1]];
                 let alpha =
                     ceiling.min(gaussian.opacity * (-0.5 * gaussian.squared_distance(d)).exp());
                 if alpha < floor {
                     continue;
                 }
-                // 7
+                // Step 7.
                 let behind = pixel.transmittance * (1.0 - alpha);
                 if behind < end {
                     pixel.finished = true;
@@ -205,7 +205,7 @@ fn centres(least: f64, greatest: f64, range: &Range<usize>) -> Range<usize> {
     first..end.max(first)
 }
 
-/// The number of standard deviations at which an alpha falls below the floor: none, with a floor of 0.
+/// The number of standard deviations at which alpha falls below the floor; infinity if the floor is 0.
 fn reach(opacity: f64, floor: f64) -> f64 {
     if floor == 0.0 {
         f64::INFINITY

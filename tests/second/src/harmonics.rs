@@ -1,4 +1,4 @@
-//! The table of functions under _Spherical Harmonics_.
+//! The functions in the table of _Spherical Harmonics_ of the text.
 
 use crate::linear::Vector;
 

@@ -1,10 +1,10 @@
 //! A second implementation of `VK_GAURAST_gaussian_primitive_topology`, written from the extension's text alone.
 //!
-//! It shares no code with the device, the driver or the oracle, and its author had read none of them: where its pictures
-//! are theirs, the text says enough. It draws what every implementation must: 3D Gaussians by the Jacobian, through a pinhole, in the
-//! order of view depth, with one sample for each pixel; and opacity compensation, degree 4 and depth tests, which are
-//! optional. All arithmetic is binary64, but for the roundings that the text names. Steps are numbered as under _What a Draw
-//! Computes_.
+//! It shares no code with the device, the driver or the oracle, and its author had read none of them. If its pictures
+//! equal theirs, the text is sufficient. It draws what every implementation must support: 3D Gaussians projected by the
+//! Jacobian, through a pinhole, in the order of view depth, with one sample per pixel. It also supports three optional
+//! features: opacity compensation, degree 4 and depth tests. All arithmetic is binary64, except for the roundings that
+//! the text requires. Steps are numbered as under _What a Draw Computes_.
 
 mod draw;
 mod harmonics;

@@ -1,4 +1,4 @@
-//! Steps 1 to 5: what one Gaussian is in the picture.
+//! Steps 1 to 5: the projection of one Gaussian to the picture.
 
 use crate::harmonics;
 use crate::linear::{
@@ -13,9 +13,9 @@ pub struct Gaussian<'a> {
     pub position: [f32; 3],
     /// Standard deviations along the Gaussian's own axes, in units of world space.
     pub scale: [f32; 3],
-    /// A quaternion, w first, that turns the Gaussian's own axes to those of the world.
+    /// A quaternion, w first, that rotates the Gaussian's own axes to those of the world.
     pub rotation: [f32; 4],
-    /// The greatest alpha, before the low-pass.
+    /// The greatest alpha, before compensation.
     pub opacity: f32,
     /// Coefficients of red, green and blue: at least (degree + 1)^2 of them.
     pub harmonics: &'a [[f32; 3]],
@@ -32,20 +32,20 @@ pub struct Camera {
     pub focal_length: [f32; 2],
     /// The principal point, in pixels from the upper left corner of the viewport's area.
     pub principal_point: [f32; 2],
-    /// Gaussians are drawn beyond this depth.
+    /// The near plane: Gaussians with a greater depth are drawn.
     pub near_plane: f32,
-    /// Gaussians are drawn before this depth; it may be infinite.
+    /// The far plane: Gaussians with a smaller depth are drawn. It may be infinite.
     pub far_plane: f32,
-    /// A depth is the first, plus the second divided by z.
+    /// The coefficients of the depth: the first, plus the second divided by z.
     pub depth_coefficients: [f32; 2],
 }
 
-/// The change of the opacity under the low-pass.
+/// The change of the opacity with the low-pass filter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Antialiasing {
-    /// None.
+    /// The opacity does not change.
     Dilate,
-    /// The opacity shrinks as the area grows.
+    /// The opacity decreases as the projected area increases.
     OpacityCompensated,
 }
 
@@ -54,19 +54,19 @@ pub enum Antialiasing {
 pub struct State {
     /// The degree of harmonics that is drawn: 0 to 4.
     pub spherical_harmonics_degree: usize,
-    /// The change of the opacity under the low-pass.
+    /// The change of the opacity with the low-pass filter.
     pub antialiasing: Antialiasing,
-    /// The variance of the low-pass, in px^2.
+    /// The variance of the low-pass filter, in px^2.
     pub low_pass_variance: f32,
     /// The least alpha that contributes.
     pub alpha_floor: f32,
     /// The greatest alpha.
     pub alpha_ceiling: f32,
-    /// The transmittance that is never fallen below.
+    /// The least transmittance that a pixel may reach.
     pub transmittance_floor: f32,
 }
 
-/// A Gaussian in the picture.
+/// A Gaussian after projection.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Projected {
     /// The mean, in pixels from the upper left corner of the viewport's area.
@@ -88,14 +88,15 @@ impl Projected {
         self.rows.map(|row| dot(row, row) + self.low_pass)
     }
 
-    /// d^T S^-1 d. The adjugate of M M^T, applied to d twice, is a square: no digits cancel where S is a needle.
+    /// d^T S^-1 d, computed as a square: the adjugate of M M^T, applied to d twice. No digits cancel for long and
+    /// narrow S.
     pub(crate) fn squared_distance(&self, d: [f64; 2]) -> f64 {
         let across = subtract(scaled(self.rows[1], d[0]), scaled(self.rows[0], d[1]));
         (dot(across, across) + self.low_pass * (d[0] * d[0] + d[1] * d[1])) / self.determinant
     }
 }
 
-/// The Gaussian in the picture, or nothing if a step skips it.
+/// Projects the Gaussian; returns `None` if a step skips it.
 pub(crate) fn project(
     gaussian: &Gaussian<'_>,
     camera: &Camera,
@@ -103,7 +104,7 @@ pub(crate) fn project(
     state: &State,
 ) -> Option<Projected> {
     let coefficients = &gaussian.harmonics[..(state.spherical_harmonics_degree + 1).pow(2)];
-    // 1
+    // Step 1.
     let finite = gaussian
         .position
         .iter()
@@ -119,7 +120,7 @@ pub(crate) fn project(
     {
         return None;
     }
-    // 2
+    // Step 2.
     let direction = subtract(widened(gaussian.position), camera.eye);
     let to_camera: Matrix = camera.rotation.map(widened);
     let t = apply(&to_camera, direction);
@@ -127,7 +128,7 @@ pub(crate) fn project(
     if !(camera.near_plane < z && z < camera.far_plane) {
         return None;
     }
-    // 3
+    // Step 3.
     let focal = widened(camera.focal_length);
     let principal = widened(camera.principal_point);
     let slopes = [t[0] / t[2], t[1] / t[2]];
@@ -147,7 +148,7 @@ pub(crate) fn project(
         let row = row_times(row_times(jacobian, &to_camera), &to_world);
         [0, 1, 2].map(|own| row[own] * f64::from(gaussian.scale[own]))
     });
-    // 4
+    // Step 4.
     let low_pass = f64::from(state.low_pass_variance);
     let area = length(cross(rows[0], rows[1]));
     let trace = dot(rows[0], rows[0]) + dot(rows[1], rows[1]);
@@ -202,7 +203,7 @@ fn turn(quaternion: [f32; 4]) -> Matrix {
     ]
 }
 
-/// Step 5: what the eye sees in a direction, which need not be normalized.
+/// Step 5: the colour in a direction, which need not be normalized.
 fn color(direction: Vector, coefficients: &[[f32; 3]]) -> Vector {
     let functions = harmonics::functions(scaled(direction, 1.0 / length(direction)));
     [0, 1, 2].map(|component| {

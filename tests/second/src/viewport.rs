@@ -13,9 +13,9 @@ pub struct Viewport {
     pub width: f32,
     /// The height.
     pub height: f32,
-    /// What a depth of 0 becomes.
+    /// The framebuffer depth of a depth of 0.
     pub min_depth: f32,
-    /// What a depth of 1 becomes.
+    /// The framebuffer depth of a depth of 1.
     pub max_depth: f32,
 }
 

@@ -1,12 +1,12 @@
-//! Atomic instructions, each invocation on memory of its own: the old value and what it leaves. (What many invocations
-//! do to the same memory is in the driver's tests.)
+//! Atomic instructions, with private memory for each invocation: the old value and the new value. (The driver's tests
+//! cover many invocations on the same memory.)
 
 use super::rows::row;
 use gaurast_tests::programs::types::{Kind, Ty};
 use gaurast_tests::programs::{Body, Expect, Row};
 use spirv::{Capability, Op};
 
-/// From the old value and the operand, the new value.
+/// Computes the new value from the old value and the operand.
 type Update = fn(Kind, u64, u64) -> u64;
 
 fn pick(kind: Kind, signed: bool, least: bool, [a, b]: [u64; 2]) -> u64 {

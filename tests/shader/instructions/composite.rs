@@ -1,4 +1,4 @@
-//! Composites and memory: values that move.
+//! Composites and memory: instructions that move values.
 
 use super::rows::row;
 use gaurast_tests::programs::assembler::Id;
@@ -7,7 +7,7 @@ use gaurast_tests::programs::types::{Kind, Ty};
 use gaurast_tests::programs::{Body, Expect, Row};
 use spirv::{Op, StorageClass};
 
-/// A row that only moves values: its model gives bits.
+/// A row that only moves values; its model gives the exact bits.
 fn moves(
     name: impl Into<String>,
     operands: &[Ty],
@@ -155,7 +155,7 @@ fn matrices(kind: Kind) -> Vec<Row> {
     ]
 }
 
-/// An array that is written and read at indices known only at run time.
+/// An array with elements that are written and read at indices known only at run time.
 fn array(kind: Kind, class: StorageClass) -> Row {
     let value = Ty::vector(kind, 2);
     let index = Ty::scalar(Kind::U32);

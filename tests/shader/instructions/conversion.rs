@@ -35,7 +35,7 @@ pub fn rows() -> Vec<Row> {
 fn float_of(kind: Kind, value: i128) -> u64 {
     match kind {
         Kind::F32 => u64::from((value as f32).to_bits()),
-        // What doubles can't hold exactly is infinite as a half.
+        // A value outside the range of doubles is infinite as a half.
         kind => kind.round(value as f64),
     }
 }
@@ -53,7 +53,7 @@ fn between(float: Kind, integer: Kind) -> Vec<Row> {
             true => (-2f64.powi(bits - 1), 2f64.powi(bits - 1)),
             false => (0.0, 2f64.powi(bits)),
         };
-        // What the integers don't hold is undefined.
+        // A value outside the integer's range gives an undefined result.
         if whole >= low && whole < high {
             Expect::Is(integer.wrap(whole as i128))
         } else {
@@ -80,7 +80,7 @@ fn between_floats(from: Kind, to: Kind) -> Vec<Row> {
     let (source, target) = (Ty::vector(from, 2), Ty::vector(to, 2));
     let mut rows = vec![each(Core(Op::FConvert), &[source], target, model)];
     if from.bits() > to.bits() {
-        // Numbers close to the middle between two of the narrower ones: where rounding twice goes wrong.
+        // Numbers near the midpoint of two narrower ones, for which rounding twice gives a wrong result.
         let mut row =
             each(Core(Op::FConvert), &[source], target, model).of(0, Domain::NearTies(to));
         row.name += " near ties";
@@ -106,7 +106,7 @@ fn between_integers(from: Kind, to: Kind) -> Vec<Row> {
     rows
 }
 
-/// To what a half holds: either neighbour, and zero for what would be denormal.
+/// Rounding to half precision: either neighbour is allowed, and zero in place of a denormal.
 fn quantized() -> Row {
     let ty = Ty::vector(Kind::F32, 2);
     each(Core(Op::QuantizeToF16), &[ty], ty, |v| {
@@ -131,7 +131,7 @@ fn quantized() -> Row {
     })
 }
 
-/// A signaling NaN made quiet, which most operations may do.
+/// A signaling NaN as a quiet one; most operations may make this change.
 fn quiet(kind: Kind, bits: u64) -> u64 {
     match kind {
         kind if kind.is_float() && kind.float(bits).is_nan() => {

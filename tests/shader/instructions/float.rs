@@ -38,7 +38,7 @@ const ARITHMETIC: &[(Op, Arithmetic)] = &[
     (Op::FMul, |a, b| a * b),
 ];
 
-/// Whether a relation holds of two numbers in this order; None where one isn't a number.
+/// A relation of two numbers that are compared; `None` if one of them is NaN.
 type Relation = fn(Option<Ordering>) -> bool;
 
 const COMPARISONS: &[(Op, Relation)] = &[
@@ -167,7 +167,8 @@ fn fused_by_hand(kind: Kind, ty: Ty) -> Row {
 }
 
 fn minimum_and_maximum(kind: Kind, ty: Ty) -> Vec<Row> {
-    // Of zeros of both signs either may come; where one isn't a number, either (FMin) or the other (NMin).
+    // For zeros of both signs either may be the result. If one operand is NaN, FMin may give either, and NMin gives the
+    // other.
     let pick = move |v: &[u64], number: bool, least: bool| {
         let (a, b) = (kind.float(v[0]), kind.float(v[1]));
         match (a.is_nan(), b.is_nan()) {

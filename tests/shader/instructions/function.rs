@@ -44,10 +44,10 @@ fn rounding(kind: Kind) -> Vec<Row> {
         })
         .collect();
     rows.extend([
-        // A half may go either way.
+        // A half may be rounded either way.
         each(Glsl(G::Round), &[ty], ty, move |v| {
             let x = kind.float(v[0]);
-            // A half down: as one up, of what is a little smaller.
+            // A half rounded down: the result for a slightly smaller number.
             let down = x.signum() * (x.abs() - 0.5).ceil();
             Expect::OneOf(
                 [x.round_ties_even(), x.round(), down]
@@ -65,7 +65,7 @@ fn rounding(kind: Kind) -> Vec<Row> {
             let fraction = x - x.floor();
             match kind.round(fraction) {
                 _ if !x.is_finite() => Expect::Any,
-                // It is less than one, where that can't be represented the largest such number.
+                // The result is less than one; a result that rounds to one may be the largest number below one.
                 one if kind.float(one) == 1.0 => Expect::OneOf(vec![one, one - 1]),
                 _ => correct_but_sign_of_zero(kind, fraction),
             }
@@ -137,7 +137,7 @@ fn mixing(kind: Kind) -> Vec<Row> {
 fn roots(kind: Kind) -> Vec<Row> {
     let (ty, p) = (shape(kind), format(kind));
     let scaled = move |op: G, factor: f64| {
-        // The factor is a constant correctly rounded, either way.
+        // The constant factor may be rounded either way.
         let constant = p.rounded(exactly(factor));
         each(Glsl(op), &[ty], ty, move |v| {
             let x = kind.float(v[0]);
@@ -157,7 +157,7 @@ fn roots(kind: Kind) -> Vec<Row> {
     ]
 }
 
-/// Significand and exponent, fraction and whole.
+/// Instructions that split a float: significand and exponent, fraction and integer part.
 fn split(kind: Kind) -> Vec<Row> {
     let ty = shape(kind);
     let exponents = ty.of(Kind::I32);
@@ -195,7 +195,7 @@ fn split(kind: Kind) -> Vec<Row> {
                 .to_vec()
         }
     };
-    // A variable of the module, and an element of an array that is indexed at run time.
+    // A variable of the module, and an array element that is indexed at run time.
     let through_array = move |body: &mut Body, v: &[u32]| {
         let whole_ty = body.ty(ty);
         let length = body.asm.u32(4);
@@ -270,7 +270,7 @@ fn frexp(kind: Kind, bits: u64) -> (Expect, Expect) {
         };
         return (same, exponent);
     }
-    // Doubles' denormals are made normal first.
+    // Denormal doubles are normalized first.
     let tiny = x.abs() < f64::MIN_POSITIVE;
     let normal = if tiny { x * 2f64.powi(64) } else { x };
     let exponent = (normal.to_bits() >> 52 & 0x7ff) as i32 - 1022;
@@ -286,13 +286,13 @@ fn ldexp(kind: Kind, x: f64, exponent: i128, largest: i128) -> Expect {
     if exponent > largest || !x.is_finite() {
         return Expect::Any;
     }
-    // In two steps, since a power of two of its own would overflow or vanish.
+    // In two steps, since a single power of two could overflow or underflow.
     let exponent = i32::try_from(exponent).expect("bounded above");
     let half = exponent / 2;
     let value = x * 2f64.powi(half) * 2f64.powi(exponent - half);
     let exact = kind.round(value);
     let denormal = value.abs() < kind.least_normal();
-    // Below this exponent, and for denormal results, zero may come.
+    // Below this exponent, and for denormal results, zero is allowed.
     if i128::from(exponent) < 2 - largest || kind == Kind::F64 && denormal {
         return Expect::OneOf(vec![exact, kind.round(0.0), kind.round(-0.0)]);
     }
@@ -328,7 +328,7 @@ fn inverse_hyperbolic(p: Format, x: f64, one: f64) -> Maybe {
 
 type Function = fn(f64) -> f64;
 
-/// The function, the formula from which its precision comes, and how large its operand usually is.
+/// The function, the formula that defines its precision, and the usual size of its operand.
 const FUNCTIONS: &[(G, Function, Formula, f64)] = &[
     (G::Sin, f64::sin, |p, x| p.sin(x), PI),
     (G::Cos, f64::cos, |p, x| p.cos(x), PI),
@@ -446,8 +446,8 @@ fn transcendental(kind: Kind) -> Vec<Row> {
     rows
 }
 
-/// A number scaled to an integer: what may come of the product's rounding, and then of rounding to a whole number,
-/// either way where it lies in the middle.
+/// A number scaled to an integer: the possible results after rounding the product and then rounding to an integer, in
+/// either direction at a half.
 fn scaled(value: f64, least: f64, most: f64) -> Option<Vec<i128>> {
     let product = format(Kind::F32).rounded(exactly(value.clamp(least, 1.0) * most));
     let whole = [product.low, product.high]
@@ -494,7 +494,7 @@ fn packing() -> Vec<Row> {
             (0..count)
                 .map(|index| {
                     let value = part.integer(v[0][0] >> (bits * index)) as f64 / most;
-                    // A division: 2.5 units in the last place.
+                    // The precision of a division: 2.5 units in the last place.
                     let p = format(Kind::F32);
                     let value = exactly(value.max(-1.0));
                     let error = 2.5 * p.ulp(value.low);

@@ -1,14 +1,14 @@
-//! Rows whose model sees a whole subgroup.
+//! Rows whose model depends on a whole subgroup.
 
 use gaurast_tests::programs::inputs::Domain;
 use gaurast_tests::programs::types::{Kind, Ty};
 use gaurast_tests::programs::{Body, Expect, Lane, Model, Row};
 use spirv::{Capability, Op};
 
-/// One truth.
+/// The type of one Boolean.
 pub const BOOL: Ty = Ty::scalar(Kind::Bool);
 
-/// A row whose model sees the whole subgroup. Its instruction names a scope first.
+/// A row whose model depends on the whole subgroup. Its instruction has a scope as first operand.
 pub fn group(
     name: impl Into<String>,
     operands: &[Ty],
@@ -34,7 +34,7 @@ pub fn scoped(body: &mut Body, op: Op, needs: Capability, ty: Ty, operands: &[u3
     body.asm.emit(op, ty, &[&[scope], operands].concat())
 }
 
-/// What `emit` gives where a condition holds, and zero elsewhere.
+/// The result of `emit` if a condition holds, and zero otherwise.
 pub fn where_true(
     body: &mut Body,
     condition: u32,

@@ -1,4 +1,4 @@
-//! Integers, bits and truth values.
+//! Integers, bits and Booleans.
 
 use super::rows::What::{Core, Glsl};
 use super::rows::{each, row, whole};
@@ -7,17 +7,17 @@ use gaurast_tests::programs::types::{Kind, Ty};
 use gaurast_tests::programs::{Expect, Row};
 use spirv::{GlslStd450Op as G, Op};
 
-/// What two integers give; None where it is undefined.
+/// The result of two integers; `None` if it is undefined.
 type Two = fn(i128, i128) -> Option<i128>;
 
-/// How an instruction sees its operands.
+/// The interpretation of an instruction's operands.
 #[derive(Clone, Copy, PartialEq)]
 enum Sees {
-    /// As their type says.
+    /// By their type.
     Typed,
-    /// As signed, whatever the type.
+    /// Signed, whatever the type.
     Signed,
-    /// As unsigned, of an unsigned type.
+    /// Unsigned, with an unsigned type.
     Unsigned,
 }
 
@@ -77,7 +77,7 @@ fn shape(kind: Kind) -> Ty {
     Ty::vector(kind, rows)
 }
 
-/// The kind whose values an instruction sees.
+/// The kind as which an instruction interprets its operands.
 fn seen(kind: Kind, sees: Sees) -> Option<Kind> {
     match sees {
         Sees::Typed => Some(kind),
@@ -99,7 +99,7 @@ pub fn rows() -> Vec<Row> {
                 continue;
             };
             rows.push(each(Core(*op), &[ty, ty], ty, move |v| {
-                // The largest negative number divided by -1 has no representation.
+                // The most negative number divided by -1 cannot be represented.
                 let value = model(seen.integer(v[0]), seen.integer(v[1]));
                 let lost = matches!(op, Op::SDiv) && value == Some(1 << (kind.bits() - 1));
                 outcome(kind, value.filter(|_| !lost))
@@ -190,7 +190,7 @@ fn shifts(kind: Kind, ty: Ty) -> Vec<Row> {
         .collect()
 }
 
-/// Instructions for 32 bits only.
+/// Instructions that support only 32 bits.
 fn bits(kind: Kind) -> Vec<Row> {
     let ty = Ty::vector(kind, 2);
     let count = Ty::scalar(Kind::U32);

@@ -20,12 +20,12 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// The sum of the products, within what the formula allows.
+/// The sum of the products, with the error that the formula allows.
 fn product(p: Format, a: &[f64], b: &[f64]) -> Expect {
     p.inherited(dot(a, b), p.dot(&exact(a), &exact(b))).into()
 }
 
-/// A component correctly rounded.
+/// The correctly rounded product of two components.
 fn times(kind: Kind, a: f64, b: f64) -> Expect {
     Expect::Is(kind.round(a * b))
 }
@@ -247,7 +247,7 @@ fn refraction(p: Format, i: &[f64], n: &[f64], eta: f64) -> Vec<Expect> {
         if k.high < 0.0 {
             return Some(exactly(0.0));
         }
-        // Where the formula can't say which it is, anything may come.
+        // If the sign of k is not certain, any result is allowed.
         (k.low >= 0.0).then_some(())?;
         let factor = p.add(p.mul(eta_exactly, along)?, p.sqrt(k)?)?;
         let bent = p.mul(eta_exactly, exactly(i[component]))?;
@@ -264,7 +264,7 @@ fn refraction(p: Format, i: &[f64], n: &[f64], eta: f64) -> Vec<Expect> {
         .collect()
 }
 
-/// The determinant by elimination of the first row; columns first.
+/// The determinant by expansion along the first row; `m` is stored by columns.
 fn determinant(m: &[f64], size: usize) -> f64 {
     if size == 1 {
         return m[0];
@@ -284,8 +284,8 @@ fn without(m: &[f64], size: usize, column: usize, row: usize) -> Vec<f64> {
         .collect()
 }
 
-/// Determinants and inverses, for which the specification asks no precision: what is asked here is 64 units in the last
-/// place of the largest number that occurs, for matrices of small numbers far from singular ones.
+/// Determinants and inverses. The specification requires no precision for them. The tests require 64 units in the last
+/// place of the largest intermediate number, for matrices of small numbers that are far from singular.
 fn of_square_matrices(kind: Kind, size: u32) -> Vec<Row> {
     let p = format(kind);
     let matrix = Ty::matrix(kind, size, size);

@@ -1,5 +1,5 @@
-//! Every instruction alone, a row each: its results against an exact model or one within the precision that Vulkan asks
-//! for, on this driver and on lavapipe.
+//! Every instruction alone, one row each. The results are compared with an exact model, or with one of the precision
+//! that Vulkan requires, on this driver and on lavapipe.
 
 mod atomic;
 mod composite;
@@ -21,7 +21,7 @@ use gaurast_tests::programs::{Expect, LANES, Row, check};
 use rows::{What, whole};
 use spirv::{GlslStd450Op as G, Op};
 
-/// All of them.
+/// All rows.
 fn all() -> Vec<Row> {
     [
         integer::rows(),
@@ -37,8 +37,8 @@ fn all() -> Vec<Row> {
     .collect()
 }
 
-/// Runs rows; those that fail must be among those that the list names, each with a reason. Without a list none may fail.
-/// The list of another driver was made with one version of it on one processor: a few more may fail, half as many as the
+/// Runs rows. Those that fail must be in the list, which gives a reason for each; with an empty list none may fail. The
+/// list of another driver was made with one version of it on one processor, so a few more may fail: half as many as the
 /// list has of these rows.
 fn check_all(context: &Context, rows: &[Row], list: &str) {
     let is_listed = |name: &str| {
@@ -67,17 +67,17 @@ fn check_all(context: &Context, rows: &[Row], list: &str) {
     );
 }
 
-/// The rows where lavapipe lies outside the specification.
+/// The rows in which lavapipe does not follow the specification.
 const LAVAPIPE: &str = include_str!("../../expected_failures/lavapipe_instructions.txt");
 
-/// Opcodes of the groups of instructions that are tried here.
+/// The opcodes of the tested groups of instructions.
 const OPCODES: &[std::ops::RangeInclusive<u32>] = &[
     // Composites, conversions, arithmetic.
     77..=84,
     109..=116,
     124..=124,
     126..=152,
-    // Truth values, relations, bits.
+    // Booleans, relations, bits.
     154..=157,
     164..=191,
     194..=205,
@@ -86,7 +86,7 @@ const OPCODES: &[std::ops::RangeInclusive<u32>] = &[
     333..=366,
 ];
 
-/// Those among them that no row is named after: they are in all rows, or need what Vulkan doesn't have.
+/// The opcodes among them that have no row of their own: they occur in all rows, or need features that Vulkan lacks.
 const IN_ALL_ROWS: &[Op] = &[Op::CompositeExtract, Op::AtomicCompareExchangeWeak];
 
 #[gaurast_runner::test]
@@ -106,7 +106,7 @@ fn every_instruction_has_a_row() {
         .map(What::name)
         .filter(|name| !is_named(name))
         .collect();
-    // The first is reserved, the others are for fragments alone.
+    // The first is reserved; the others exist only in fragment shaders.
     let none = [
         "GlslIMix",
         "GlslInterpolateAtCentroid",

@@ -21,7 +21,7 @@ struct Reduction {
     op: Op,
     kinds: &'static [Kind],
     combine: Combine,
-    /// Bits of the identity.
+    /// The bits of the identity.
     identity: fn(Kind) -> u64,
 }
 
@@ -128,7 +128,7 @@ const REDUCTIONS: &[Reduction] = &[
     },
 ];
 
-/// Sums and products of floats are tried with numbers for which they are exact in any order.
+/// The domain of operands. Sums and products of floats use numbers for which they are exact in any order.
 fn domain(op: Op, kind: Kind) -> Domain {
     match op {
         Op::GroupNonUniformFAdd => Domain::Integers(-8, 8),
@@ -139,7 +139,7 @@ fn domain(op: Op, kind: Kind) -> Domain {
     }
 }
 
-/// What a combination of invocations that took part gives, each scan's own.
+/// The result of combining the values of the active invocations, for each kind of scan.
 fn combined(reduction: &Reduction, kind: Kind, values: impl Iterator<Item = u64>) -> Vec<Expect> {
     let identity = (reduction.identity)(kind);
     let bits = values.fold(identity, |sum, value| (reduction.combine)(kind, sum, value));
@@ -161,7 +161,7 @@ fn reductions(
         for kind in reduction.kinds.iter().copied() {
             let ty = Ty::scalar(kind);
             let domain = domain(reduction.op, kind);
-            // Floats arrive as integers, so that they are whole numbers.
+            // Floats are converted from integers, so that they are integers.
             let whole = kind.is_float() && matches!(domain, Domain::Integers(..));
             let source = if whole { Ty::scalar(Kind::I32) } else { ty };
             let suffix = if guarded {

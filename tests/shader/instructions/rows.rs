@@ -42,7 +42,7 @@ pub fn name_of(what: What, operands: &[Ty], results: &[Ty]) -> String {
     format!("{} {} -> {}", what.name(), all(operands), all(results))
 }
 
-/// A row whose model sees an invocation's operands.
+/// A row whose model depends only on an invocation's operands.
 pub fn row(
     name: String,
     operands: &[Ty],

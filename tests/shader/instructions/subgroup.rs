@@ -8,7 +8,7 @@ use gaurast_tests::programs::types::{Kind, Ty};
 use gaurast_tests::programs::{Expect, Lane, Row};
 use spirv::{BuiltIn, Capability, GroupOperation, Op};
 
-/// A group of instructions, which a driver has all of or none: the name, Vulkan's flag, and the rows.
+/// A group of instructions that a driver supports as a whole: the name, Vulkan's flag, and the rows.
 pub type Group = (&'static str, Flags, fn() -> Vec<Row>);
 
 /// All groups.
@@ -86,7 +86,7 @@ fn votes() -> Vec<Row> {
             true => lanes.iter().all(|lane| lane[operand][0] != 0),
             false => lanes.iter().any(|lane| lane[operand][0] != 0),
         };
-        // Random truth values are rarely all the same: compare with a bound instead.
+        // Random Booleans are rarely all equal, so values are compared with a bound.
         for bound in [1, 30, 1 << 30] {
             rows.push(
                 group(
@@ -136,7 +136,7 @@ fn votes() -> Vec<Row> {
                 &[ty, Ty::scalar(Kind::U32)],
                 BOOL,
                 move |body, v| {
-                    // The same for all in about half of the subgroups.
+                    // The value is equal for all invocations in about half of the subgroups.
                     let (truth, id) = (body.ty(BOOL), body.ty(ty));
                     let zero = body.asm.u32(0);
                     let same = body.asm.emit(Op::IEqual, truth, &[v[1], zero]);
@@ -208,7 +208,7 @@ fn ballots() -> Vec<Row> {
             &[BALLOT],
             BOOL,
             move |body, v| {
-                // The same for all, as it must be: the first invocation's.
+                // The value must be equal for all, so it is the first invocation's.
                 let op = Op::GroupNonUniformBroadcastFirst;
                 let first = scoped(body, op, needs, BALLOT, v);
                 scoped(
@@ -293,7 +293,7 @@ fn ballots() -> Vec<Row> {
     rows
 }
 
-/// Counts and ends of a ballot's bits: only those of the subgroup count.
+/// Counts and positions of a ballot's bits. Only the bits of the subgroup count.
 fn ballot_bits() -> Vec<Row> {
     let needs = Capability::GroupNonUniformBallot;
     let mut rows = Vec::new();
@@ -339,7 +339,7 @@ fn ballot_bits() -> Vec<Row> {
             move |lanes, me| {
                 let mut set = (0..lanes.len()).filter(|lane| bit_of(&lanes[me][0], *lane));
                 let found = if lowest { set.next() } else { set.next_back() };
-                // Without any it is undefined.
+                // Without a set bit the result is undefined.
                 vec![found.map_or(Expect::Any, |lane| Expect::Is(lane as u64))]
             },
         ));
@@ -347,7 +347,7 @@ fn ballot_bits() -> Vec<Row> {
     rows
 }
 
-/// A row that fetches a value from another invocation, if that exists.
+/// A row that reads a value of another invocation, if that exists.
 fn moved(
     op: Op,
     needs: Capability,

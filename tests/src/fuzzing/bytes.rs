@@ -1,6 +1,6 @@
-//! Choices taken from bytes, as fuzzers give them: where there are no more, all are zero.
+//! Decodes a fuzzer's bytes into choices. After the last byte, all choices are zero.
 
-/// Bytes, as far as they have not been used.
+/// The bytes that are not used yet.
 #[derive(Clone, Copy, Debug)]
 pub struct Bytes<'a>(&'a [u8]);
 
@@ -10,7 +10,7 @@ impl<'a> Bytes<'a> {
         Self(bytes)
     }
 
-    /// Whether none are left.
+    /// True if no byte is left.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
@@ -36,7 +36,7 @@ impl<'a> Bytes<'a> {
         values[self.below(values.len())].clone()
     }
 
-    /// True once in `count` times.
+    /// True in one of `count` cases.
     pub fn rarely(&mut self, count: usize) -> bool {
         self.below(count) == count - 1
     }
@@ -46,7 +46,7 @@ impl<'a> Bytes<'a> {
         u32::from_le_bytes([0; 4].map(|_| self.byte()))
     }
 
-    /// A small number mostly, and now and then any at all or one about which something may go wrong.
+    /// A small number in most cases; sometimes any number, or an edge case.
     pub fn number(&mut self, usual: u32) -> u32 {
         match self.below(16) {
             0 => self.word(),
@@ -62,7 +62,7 @@ impl<'a> Bytes<'a> {
         }
     }
 
-    /// As [`Bytes::number`], of twice as many bits.
+    /// A number as [`Bytes::number`] gives it, with twice as many bits.
     pub fn long(&mut self, usual: u32) -> u64 {
         match self.below(32) {
             0 => u64::from(self.word()) << 32 | u64::from(self.word()),
@@ -77,7 +77,7 @@ impl<'a> Bytes<'a> {
         }
     }
 
-    /// A number of ordinary size mostly, and now and then one that is not: huge, tiny, or none.
+    /// A number of ordinary size in most cases; sometimes a huge one, a tiny one, or NaN.
     pub fn float(&mut self) -> f32 {
         match self.below(12) {
             0 => f32::from_bits(self.word()),

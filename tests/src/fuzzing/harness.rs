@@ -1,4 +1,4 @@
-//! A device that runs what it is given, and looks afterwards whether anything outside the bound ranges was written.
+//! A device that runs shader modules and then checks that nothing outside the bound ranges was written.
 
 use ash::vk;
 use gaurast_spirv::{DescriptorKind, Module, Options, Specialization, Stage, translate};
@@ -7,28 +7,29 @@ use gaurast_testkit::{Binding, Buffer, Driver, Gpu, Kernel, Opening, Sets, whole
 
 /// Bytes of each bound range, and of the guards before and after it.
 const RANGE: u64 = 1024;
-/// Bindings at most.
+/// The greatest number of bindings.
 const MOST_BINDINGS: usize = 16;
 const GUARD: u8 = 0xa5;
 const PUSH_BYTES: usize = 128;
 
-/// What became of a module.
+/// The result of running a module.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// No shader module or pipeline came of it.
+    /// The shader module or the pipeline was refused.
     Refused,
-    /// It ran to its end.
+    /// The dispatch completed.
     Ran,
-    /// It took too long, or went wrong, and the device was lost.
+    /// The dispatch took too long or failed, and the device was lost.
     Lost,
 }
 
-/// The descriptors that a module asks for, by set and binding.
+/// The descriptors that a module requires, by set and binding.
 #[derive(Clone, Debug, Default)]
 pub struct Layout(Vec<(u32, u32, u32, vk::DescriptorType)>);
 
 impl Layout {
-    /// What a module asks for; `None` if it isn't one, or asks for anything but buffers.
+    /// The descriptors that a module requires; `None` if the words are no module or it requires other descriptors than
+    /// buffers.
     pub fn of(words: &[u32]) -> Option<Self> {
         let module = Module::parse(words).ok()?;
         let (specialization, options) = (Specialization::default(), Options::default());
@@ -55,15 +56,15 @@ pub struct Harness {
 }
 
 impl Harness {
-    /// Opens this driver's device. How long a dispatch may take comes from the environment, as for any application.
+    /// Opens this driver's device. The time limit of a dispatch comes from the environment, as for any application.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Takes words through a shader module, a pipeline and a dispatch of two workgroups.
+    /// Creates a shader module and a pipeline of the words, and dispatches two workgroups.
     ///
     /// # Panics
-    /// If memory outside the bound ranges was written, or the device can't do something that doesn't depend on the
+    /// If memory outside the bound ranges was written, or the device fails at something that does not depend on the
     /// words.
     pub fn run(&mut self, words: &[u32], layout: &Layout) -> Outcome {
         let open = self.open.get_or_insert_with(Open::new);
@@ -96,7 +97,7 @@ impl Open {
         }
     }
 
-    /// Guards everywhere, and small numbers within the ranges.
+    /// Writes the guard pattern everywhere, and small numbers in the ranges.
     fn fill(&self) {
         let mut bytes = vec![GUARD; BYTES];
         for range in bytes.chunks_mut(RANGE as usize).skip(1).step_by(2) {
@@ -140,7 +141,7 @@ impl Open {
         }
     }
 
-    /// Sets whose descriptors are the guarded ranges, one after another.
+    /// Allocates sets whose descriptors are the guarded ranges, one after another.
     fn bound(&self, sets: &Sets, layout: &Layout) -> Vec<vk::DescriptorSet> {
         if sets.layouts.is_empty() {
             return Vec::new();

@@ -1,4 +1,4 @@
-//! Scene files of any bytes whatever.
+//! Scene files with arbitrary bytes.
 
 use std::path::Path;
 
@@ -8,8 +8,8 @@ use std::io::Read;
 
 use super::bytes::Bytes;
 
-/// What a file is called, and how it is stored. SPZ files are compressed, so that changes of their bytes seldom get
-/// further than to the check sum: one kind is compressed here.
+/// File names, each with true if the bytes are compressed here. SPZ files are compressed, so most changes of their
+/// bytes fail at the checksum. One kind of SPZ file is therefore compressed after the changes.
 const KINDS: [(&str, bool); 10] = [
     ("a.ply", false),
     ("a.splat", false),
@@ -23,11 +23,11 @@ const KINDS: [(&str, bool); 10] = [
     ("a.ply.gz", true),
 ];
 
-/// Reads bytes as a scene: the first one says of which kind, the others are the file. Returns how many Gaussians it has
-/// if it is one.
+/// Reads bytes as a scene. The first byte selects the kind, and the others are the file. Returns the number of
+/// Gaussians if the file is valid.
 ///
 /// # Panics
-/// If the scene contradicts itself.
+/// If the scene is inconsistent.
 pub fn load(data: &[u8]) -> Option<usize> {
     let mut bytes = Bytes::new(data);
     let (name, compress) = bytes.one(&KINDS);
@@ -50,7 +50,7 @@ pub fn load(data: &[u8]) -> Option<usize> {
             Some(count)
         }
         Err(error) => {
-            // It is said in one line.
+            // The message is a single line.
             let message = error.to_string();
             assert!(
                 !message.is_empty() && !message.contains('\n'),
@@ -61,7 +61,7 @@ pub fn load(data: &[u8]) -> Option<usize> {
     }
 }
 
-/// Files to begin with, one of each kind, as [`load`] takes them.
+/// Seed files, one of each kind, in the form that [`load`] expects.
 pub fn seeds() -> Vec<Vec<u8>> {
     let header = |format: &str, properties: &[&str]| {
         let properties: Vec<_> = properties

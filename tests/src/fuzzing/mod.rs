@@ -1,5 +1,5 @@
-//! What fuzz targets run, and the deterministic tests beside them: modules of any words taken through a pipeline's
-//! creation and a dispatch, scene files of any bytes, Vulkan calls and packets in any order.
+//! Functions that fuzz targets and deterministic tests call: shader modules of any words, which are created and
+//! dispatched; scene files of any bytes; Vulkan calls and packets in any order.
 
 mod bytes;
 pub mod calls;

@@ -1,4 +1,4 @@
-//! Modules changed at random: bytes, and whole instructions.
+//! Random changes of bytes and of whole instructions in modules.
 
 use rand::Rng;
 use rand::seq::IndexedRandom;
@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 /// The words before the first instruction.
 const HEADER: usize = 5;
 
-/// Where the instructions of a module begin, and how many words each has.
+/// The start and the length, in words, of each instruction of a module.
 fn instructions(words: &[u32]) -> Vec<(usize, usize)> {
     let mut all = Vec::new();
     let mut at = HEADER;
@@ -53,7 +53,7 @@ pub fn mutate_bytes(random: &mut ChaCha8Rng, bytes: &[u8], other: &[u8]) -> Vec<
     bytes
 }
 
-/// A number with which something may go wrong, or any.
+/// An edge case or any number.
 fn number(random: &mut ChaCha8Rng, bound: u32) -> u32 {
     match random.random_range(0..5) {
         0 => random.random(),
@@ -102,7 +102,7 @@ fn change(random: &mut ChaCha8Rng, words: &mut Vec<u32>, other: &[u32]) {
             let [a, b] = [(); 2].map(|()| start + random.random_range(1..count));
             words.swap(a, b);
         }
-        // An operand comes from an instruction of the same opcode, which has the right type more often than not.
+        // An operand comes from an instruction of the same opcode, so that it usually has the right type.
         15..=18 if count > 1 => {
             let at = random.random_range(1..count);
             let same: Vec<_> = all
@@ -114,7 +114,7 @@ fn change(random: &mut ChaCha8Rng, words: &mut Vec<u32>, other: &[u32]) {
                 words[start + at] = words[from + at];
             }
         }
-        // Another opcode: any, one next to it, or that of an instruction of the same size.
+        // Another opcode: any, a neighbour, or that of an instruction of the same length.
         7 => words[start] = words[start] & 0xffff_0000 | random.random_range(0..460),
         8 | 9 => {
             let opcode = words[start] as u16;
@@ -129,7 +129,7 @@ fn change(random: &mut ChaCha8Rng, words: &mut Vec<u32>, other: &[u32]) {
                 words[start] = words[*from];
             }
         }
-        // An instruction vanishes, is doubled, or moves.
+        // An instruction is removed, doubled or moved.
         12 => drop(words.drain(start..start + count)),
         13 => {
             let copy = words[start..start + count].to_vec();

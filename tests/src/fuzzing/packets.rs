@@ -1,5 +1,5 @@
-//! Packets in any order and with any numbers, as no driver would send them: the device refuses them or executes them,
-//! and writes nowhere but where they say.
+//! Packets in any order and with any numbers, which no driver would send. The device refuses or executes them, and
+//! writes only to the memory that they name.
 
 use std::sync::Arc;
 
@@ -38,15 +38,15 @@ const FORMATS: [Format; 8] = [
     Format::D24UnormS8Uint,
     Format::Bc1RgbUnormBlock,
 ];
-/// Packets of a run at most.
+/// The greatest number of packets of a run.
 const PACKETS: usize = 60;
 
-/// A device, and what packets are about.
+/// A device, and the resources that packets use.
 pub struct Player {
     device: Arc<Device>,
 }
 
-/// How packets fared.
+/// The counts of executed and refused packets.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Fared {
     /// They were executed.
@@ -75,7 +75,7 @@ impl Player {
     pub fn new() -> Self {
         let config = Config {
             threads: 1,
-            // A few passes flush within.
+            // A small budget, so that some passes flush early.
             bin_budget_bytes: 1 << 16,
             ..Config::default()
         };
@@ -84,10 +84,10 @@ impl Player {
         }
     }
 
-    /// Executes what bytes say.
+    /// Executes the packets that `data` encodes.
     ///
     /// # Panics
-    /// If something was written that no packet names.
+    /// If memory was written that no packet names.
     pub fn run(&self, data: &[u8]) -> Fared {
         let mut bytes = Bytes::new(data);
         let resources = Resources::new(&mut bytes);
@@ -121,8 +121,8 @@ impl Resources {
             memory
         };
         let buffers = vec![buffer(true), buffer(false)];
-        // Something like Gaussians: floats of ordinary size. Few, so that most bytes are left for packets, and again and
-        // again, a prime number of them so that they meet anew.
+        // Data that resembles Gaussians: floats of ordinary size. There are few, so that most bytes are left for
+        // packets. They repeat with a prime period, so that each element starts at another one.
         let pattern = [0; 61].map(|_| bytes.float());
         let count = (BUFFER - 2 * GUARD) as usize / 4;
         let floats: Vec<f32> = pattern.into_iter().cycle().take(count).collect();
@@ -155,7 +155,7 @@ impl Resources {
         }
     }
 
-    /// A range between the guards. Packets may say what they like of what lies within.
+    /// A range between the guards. Packets may use any part of it.
     fn range(&self, bytes: &mut Bytes<'_>) -> BufferRange {
         let inside = BUFFER - 2 * GUARD;
         let offset = (u64::from(bytes.word()) % inside) & !3;
@@ -322,7 +322,7 @@ fn rendering(bytes: &mut Bytes<'_>, resources: &Resources) -> Option<Packet> {
     };
     let (mut area, mut layer_count) = (rect(bytes), bytes.number(3));
     if color.iter().flatten().next().is_none() && depth.is_none() && stencil.is_none() {
-        // Nothing else bounds them. More is no other than much, but takes long.
+        // Nothing else limits the area. A larger one takes long and tests nothing more.
         (area.width, area.height) = (area.width % 3000, area.height % 3000);
         layer_count %= 5;
     }
@@ -381,7 +381,7 @@ fn buffer_packet(bytes: &mut Bytes<'_>, resources: &Resources) -> Packet {
         },
         _ => {
             let source = resources.range(bytes);
-            // Regions lie in both, as the driver sees to.
+            // Regions are within both images, as the driver guarantees.
             let most = source.size.min(target.size);
             let size = u64::from(bytes.word()) % (most + 1);
             let region = BufferCopyRegion {
@@ -563,7 +563,7 @@ fn append(bytes: &mut Bytes<'_>, resources: &Resources) -> Packet {
             vertex_offset: bytes.number(9).cast_signed(),
         }),
         first: bytes.number(20),
-        // More is no other than much, but takes long.
+        // A larger count takes long and tests nothing more.
         count: bytes.number(600) % 5000,
         first_instance: bytes.number(4),
         instance_count: 1 + bytes.below(3) as u32,
@@ -578,7 +578,7 @@ fn draw(bytes: &mut Bytes<'_>, resources: &Resources) -> Vec<Packet> {
     packets
 }
 
-/// A part of a draw where it may not belong.
+/// A packet of a draw in a place where it may be invalid.
 fn one_of_a_draw(bytes: &mut Bytes<'_>, resources: &Resources) -> Packet {
     match bytes.below(3) {
         0 => begin(bytes),

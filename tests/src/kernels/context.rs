@@ -7,21 +7,21 @@ use gaurast_testkit::{
 
 use super::kernel::Kernel;
 
-/// A device, and what its shader cores can do.
+/// A device, and the properties of its shader cores.
 pub struct Context {
     /// The device.
     pub gpu: Gpu,
     /// The driver's name and version.
     pub name: String,
-    /// Invocations of a subgroup.
+    /// Number of invocations of a subgroup.
     pub subgroup_size: u32,
-    /// What its subgroups can do.
+    /// The supported subgroup operations.
     pub subgroup_operations: vk::SubgroupFeatureFlags,
-    /// Whether shaders can ask for denormals of every float type to be kept.
+    /// True if shaders can require that denormals of every float type are preserved.
     pub preserves_denormals: bool,
 }
 
-/// Vulkan refused something.
+/// A Vulkan call that failed, and its result.
 #[derive(Clone, Copy, Debug, thiserror::Error)]
 #[error("Vulkan refused to {what}: {result}")]
 pub struct Refused {
@@ -34,7 +34,7 @@ fn refused(what: &'static str) -> impl Fn(vk::Result) -> Refused {
 }
 
 impl Context {
-    /// This driver, linked into the process.
+    /// Opens this driver, linked into the process.
     ///
     /// # Errors
     /// [`OpenError`] if the device cannot be opened.
@@ -42,10 +42,10 @@ impl Context {
         Gpu::embedded(&Settings::default()).map(Self::of)
     }
 
-    /// lavapipe, by its driver id; `None` where there is no loader or it does not know lavapipe.
+    /// Opens lavapipe, by its driver id; `None` if there is no loader or it does not find lavapipe.
     ///
     /// # Errors
-    /// [`OpenError`] if it is there but cannot be opened.
+    /// [`OpenError`] if lavapipe is present but cannot be opened.
     pub fn lavapipe() -> Result<Option<Self>, OpenError> {
         match Gpu::lavapipe() {
             Ok(gpu) => Ok(Some(Self::of(gpu))),
@@ -77,7 +77,7 @@ impl Context {
         }
     }
 
-    /// Makes a kernel ready: its pipeline, its buffers with their contents, and its commands.
+    /// Prepares a kernel: its pipeline, its buffers with their contents, and its commands.
     ///
     /// # Errors
     /// [`Refused`] if the driver refuses the pipeline.
@@ -120,15 +120,15 @@ pub struct Prepared {
 }
 
 impl Prepared {
-    /// Runs it and waits for the end.
+    /// Runs it and waits for its completion.
     ///
     /// # Errors
-    /// [`Refused`], for example of a lost device.
+    /// [`Refused`], for example if the device is lost.
     pub fn run(&self) -> Result<(), Refused> {
         self.recorded.try_submit().map_err(refused("submit"))
     }
 
-    /// What the buffer of a binding holds.
+    /// The contents of the buffer of a binding.
     pub fn read(&self, binding: usize) -> Vec<u32> {
         self.buffers[binding].values()
     }

@@ -1,9 +1,9 @@
-//! A dispatch, and what it must leave behind.
+//! A dispatch and its expected results.
 
 use ash::vk;
 use std::borrow::Cow;
 
-/// A dispatch of a kernel, and what it must leave behind.
+/// A dispatch of a kernel and its expected results.
 pub struct Kernel {
     /// Its name.
     pub name: &'static str,
@@ -11,7 +11,7 @@ pub struct Kernel {
     pub spirv: Cow<'static, [u8]>,
     /// Values of specialization constants, by id.
     pub specialization: Vec<(u32, u32)>,
-    /// What the buffers of bindings 0.. hold before.
+    /// The initial contents of the buffers of bindings 0, 1 and so on.
     pub buffers: Vec<Vec<u32>>,
     /// The binding that is a uniform buffer, if one is; the others are storage buffers.
     pub uniform: Option<u32>,
@@ -19,11 +19,11 @@ pub struct Kernel {
     pub push: Vec<u32>,
     /// Workgroups in x, y and z.
     pub groups: [u32; 3],
-    /// What the host computes.
+    /// The results that the host computes.
     pub expected: Vec<Expected>,
 }
 
-/// What a buffer must hold after one dispatch.
+/// The expected contents of a buffer after one dispatch.
 pub struct Expected {
     /// Its binding.
     pub binding: usize,
@@ -31,16 +31,16 @@ pub struct Expected {
     pub values: Values,
 }
 
-/// What words must be.
+/// Expected words.
 pub enum Values {
-    /// These.
+    /// Exactly these words.
     Exact(Vec<u32>),
-    /// Floats that differ from these by at most the tolerance times their magnitude, or times 1 for smaller ones.
+    /// Floats within the tolerance times the magnitude of these, or times 1 for smaller magnitudes.
     Close(Vec<f32>, f32),
 }
 
 impl Kernel {
-    /// What the descriptor of a binding is.
+    /// The descriptor type of a binding.
     pub fn descriptor_type(&self, binding: u32) -> vk::DescriptorType {
         if self.uniform == Some(binding) {
             vk::DescriptorType::UNIFORM_BUFFER
@@ -67,7 +67,7 @@ impl Values {
             Self::Close(floats, tolerance) => {
                 let far = |(wanted, found): (&f32, &u32)| {
                     let error = (f32::from_bits(*found) - wanted).abs();
-                    // A NaN is far from everything.
+                    // The difference of NaN and a number is never within the tolerance.
                     !matches!(error.partial_cmp(&(tolerance * wanted.abs().max(1.0))), Some(order) if order.is_le())
                 };
                 let index = floats.iter().zip(found).position(far)?;

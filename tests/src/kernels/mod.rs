@@ -1,4 +1,4 @@
-//! Real compute kernels, with what the host computes instead: for tests and benchmarks of shader cores.
+//! Realistic compute kernels with results computed on the host, for tests and benchmarks of shader cores.
 
 mod context;
 mod kernel;
@@ -11,12 +11,12 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use std::borrow::Cow;
 
-/// How much the kernels have to do.
+/// The amount of work of the kernels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Size {
-    /// Enough to show that they are right.
+    /// Enough to test the results.
     Small,
-    /// Enough to measure how fast they are: some tens of milliseconds.
+    /// Enough to measure the speed: some tens of milliseconds.
     Large,
 }
 

@@ -1,4 +1,4 @@
-//! Writes SPIR-V, word by word: what a test needs of a module's layout, and no more.
+//! A minimal SPIR-V assembler for tests, which writes modules word by word.
 
 use spirv::{
     AddressingModel, BuiltIn, Capability, Decoration, ExecutionMode, ExecutionModel,
@@ -9,10 +9,10 @@ use std::collections::{BTreeSet, HashMap};
 /// An id of a module.
 pub type Id = u32;
 
-/// Version 1.5, which Vulkan 1.2 and later take.
+/// Version 1.5, which Vulkan 1.2 and later accept.
 const VERSION: u32 = 0x0001_0500;
 
-/// A compute shader in the making.
+/// A compute shader under construction.
 pub struct Assembler {
     next: Id,
     main: Id,
@@ -42,7 +42,7 @@ fn string(text: &str) -> Vec<u32> {
 }
 
 impl Assembler {
-    /// A module whose entry point `main` has a workgroup of this many invocations in a row.
+    /// Creates a module whose entry point `main` has a workgroup of this many invocations in x.
     pub fn new(workgroup: u32) -> Self {
         let mut this = Self {
             next: 3,
@@ -103,7 +103,7 @@ impl Assembler {
         instruction(&mut self.decorations, Op::MemberDecorate, &operands);
     }
 
-    /// A type or a constant; the same one again if it is declared already.
+    /// Declares a type or a constant; returns the existing one if it is declared already.
     pub fn declare(&mut self, op: Op, ty: Option<Id>, operands: &[u32]) -> Id {
         let mut key = vec![op as u32, ty.unwrap_or(0)];
         key.extend_from_slice(operands);
@@ -115,7 +115,7 @@ impl Assembler {
         id
     }
 
-    /// A type or a constant of its own, which may be decorated.
+    /// Declares a type or a constant that is not shared, so that it may be decorated.
     pub fn declare_anew(&mut self, op: Op, ty: Option<Id>, operands: &[u32]) -> Id {
         let id = self.id();
         let words: Vec<u32> = ty.into_iter().chain([id]).collect();
@@ -142,7 +142,7 @@ impl Assembler {
         id
     }
 
-    /// A storage buffer of set 0: an array without a length of elements of this type and size in bytes.
+    /// A storage buffer of set 0: a runtime array of elements of this type and size in bytes.
     pub fn storage_buffer(&mut self, binding: u32, element: Id, bytes: u32) -> Id {
         let array = self.declare_anew(Op::TypeRuntimeArray, None, &[element]);
         self.decorate(array, Decoration::ArrayStride, &[bytes]);
@@ -194,8 +194,8 @@ impl Assembler {
         self.act(Op::Label, &[id]);
     }
 
-    /// Ends a function whose blocks after the first were emitted, the first without its label. Returns nothing or what
-    /// its last block said; its parameters have these ids and types.
+    /// Ends a function whose blocks have been emitted, the first one without its label. The function returns nothing,
+    /// or the value that its last block returns. Its parameters have these ids and types.
     pub fn function(&mut self, id: Id, returns: Id, parameters: &[(Id, Id)]) {
         let types: Vec<Id> = [returns]
             .into_iter()

@@ -1,19 +1,19 @@
-//! What instructions are tried with: values at the edges of their types, and random ones.
+//! Test values of operands: values at the edges of their types, and random ones.
 
 use super::types::Kind;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-/// What an operand may be.
+/// The set of values of an operand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Domain {
-    /// Anything, with all that is special.
+    /// Any value, with all special values of the type.
     Any,
-    /// Floats from one number to another.
+    /// Floats in a range.
     Floats(f64, f64),
-    /// Integers from one number to another.
+    /// Integers in a range.
     Integers(i128, i128),
-    /// Floats in the middle between two of a narrower type, or next to it.
+    /// Floats at, or next to, the midpoint of two floats of a narrower type.
     NearTies(Kind),
 }
 
@@ -68,8 +68,8 @@ fn anything(kind: Kind, random: &mut ChaCha8Rng) -> u64 {
     }
 }
 
-/// A value of a domain for component `component` of operand `operand`. The first lanes take the special values of the
-/// first two operands, each with each.
+/// A value of a domain for component `component` of operand `operand`. The first lanes take all combinations of the
+/// special values of the first two operands.
 pub fn value(
     kind: Kind,
     domain: Domain,

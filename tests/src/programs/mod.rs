@@ -1,4 +1,4 @@
-//! Programs made up for tests of the shader cores: one instruction each ([`Row`]), or control flow at random
+//! Generated programs for tests of the shader cores: single instructions ([`Row`]), and random control flow
 //! ([`structured`]).
 
 pub mod assembler;

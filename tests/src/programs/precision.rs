@@ -1,9 +1,9 @@
-//! How precise Vulkan asks floating-point results to be ("Precision of Individual Operations").
+//! The precision that Vulkan requires of floating-point results ("Precision of Individual Operations").
 //!
-//! An error bound in units in the last place becomes an interval. A precision that is inherited from a formula becomes
-//! the formula evaluated over intervals, each step with what it is allowed, and then the interval around the true result
-//! that reaches as far as the farther end. An operation outside its domain, or whose formula may give NaN, permits
-//! anything: that is `None`.
+//! An error bound in units in the last place is modelled by an interval. A precision that is inherited from a formula
+//! is modelled by evaluating the formula over intervals, each step with its own error. The result is the interval
+//! around the true value that reaches as far as the farther end. An operation outside its domain, or whose formula may
+//! give NaN, permits any result, which is `None`.
 
 use super::types::Kind;
 
@@ -48,8 +48,8 @@ pub const SINGLE: Format = Format {
     atan_ulps: 4096.0,
 };
 
-/// What is asked of double precision here. The specification has no table for it; this is six bits less than it holds,
-/// so that the models' own rounding, in double precision too, doesn't matter.
+/// The requirement on double precision in these tests. The specification has no table for it. It is six bits less than
+/// the format has, so that the rounding of the models, which are in double precision too, has no effect.
 pub const DOUBLE: Format = Format {
     digits: 46,
     least: -1022,
@@ -60,7 +60,7 @@ pub const DOUBLE: Format = Format {
     atan_ulps: 4096.0,
 };
 
-/// The format of a kind of floats.
+/// The format of a float kind.
 pub fn format(kind: Kind) -> Format {
     match kind {
         Kind::F16 => HALF,
@@ -69,19 +69,19 @@ pub fn format(kind: Kind) -> Format {
     }
 }
 
-/// All numbers from `low` to `high`.
+/// The numbers from `low` to `high`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
-    /// The least.
+    /// The lower end.
     pub low: f64,
-    /// The greatest.
+    /// The upper end.
     pub high: f64,
 }
 
-/// An interval, or None where the result is undefined.
+/// An interval, or `None` if the result is undefined.
 pub type Maybe = Option<Interval>;
 
-/// One number.
+/// The interval of one number.
 pub fn exactly(value: f64) -> Interval {
     Interval {
         low: value,
@@ -89,9 +89,9 @@ pub fn exactly(value: f64) -> Interval {
     }
 }
 
-/// A power of two, down to the least double.
+/// A power of two, at least the least positive double.
 fn power(exponent: i32) -> f64 {
-    // `powi` divides by a power that would be infinite.
+    // `powi` computes negative powers by division, which would overflow to infinity.
     let exponent = exponent.max(-1074);
     2f64.powi(exponent / 2) * 2f64.powi(exponent - exponent / 2)
 }
@@ -110,7 +110,7 @@ fn hull(values: &[f64]) -> Maybe {
     Some(all)
 }
 
-/// All results of a function that is monotone in each operand.
+/// The range of a function that is monotone in each operand, from its values at the corners.
 fn corners(a: Interval, b: Interval, function: impl Fn(f64, f64) -> f64) -> Maybe {
     hull(&[
         function(a.low, b.low),
@@ -125,7 +125,7 @@ impl Interval {
         self.low <= value && value <= self.high
     }
 
-    /// The opposite numbers.
+    /// The negated numbers.
     pub fn negated(self) -> Self {
         Self {
             low: -self.high,
@@ -142,7 +142,7 @@ impl Interval {
 }
 
 impl Format {
-    /// A unit in the last place of a number.
+    /// The unit in the last place of a number.
     pub fn ulp(self, value: f64) -> f64 {
         let size = value.abs();
         if size == 0.0 || !size.is_finite() {
@@ -150,7 +150,7 @@ impl Format {
             return power(exponent - self.digits);
         }
         let mut exponent = ((size.to_bits() >> 52) as i32 - 1023).max(self.least);
-        // Below a power of two the numbers lie closer together.
+        // Below a power of two the numbers are closer together.
         if exponent > self.least && size == 2f64.powi(exponent) {
             exponent -= 1;
         }
@@ -169,7 +169,7 @@ impl Format {
         )
     }
 
-    /// What may come of a correctly rounded result: the numbers of the format next to it on either side.
+    /// The possible results of a correctly rounded operation: the neighbouring numbers of the format on either side.
     pub fn rounded(self, exact: Interval) -> Interval {
         let grid = |value: f64| {
             let ulp = self.ulp(value * (1.0 + f64::EPSILON));
@@ -223,7 +223,7 @@ impl Format {
 
     /// The sum of the products of components.
     pub fn dot(self, a: &[Interval], b: &[Interval]) -> Maybe {
-        // Any order of the additions is allowed, so each one's rounding is that of the largest partial sum.
+        // Any order of the additions is allowed, so each addition is rounded as the largest partial sum is.
         let mut sum = exactly(0.0);
         let mut largest = 0f64;
         for (a, b) in a.iter().zip(b) {
@@ -308,12 +308,12 @@ impl Format {
 
     /// The angle of (x, y), for intervals within a quadrant.
     pub fn atan2(self, y: Interval, x: Interval) -> Maybe {
-        // Where both are zero, or either is infinite, GLSL leaves it undefined.
+        // GLSL leaves the result undefined if both are zero or either is infinite.
         let finite = [y.low, y.high, x.low, x.high]
             .iter()
             .all(|it| it.is_finite());
         (finite && !(y.has(0.0) && x.has(0.0))).then_some(())?;
-        // The cut: on the negative x axis either sign of pi may come.
+        // The branch cut: on the negative x axis both signs of pi are possible.
         if y.has(0.0) && x.low < 0.0 {
             let far = std::f64::consts::PI + self.atan_ulps * self.ulp(std::f64::consts::PI);
             return Some(Interval {
@@ -325,22 +325,22 @@ impl Format {
         Some(self.ulps(exact, |_| self.atan_ulps))
     }
 
-    /// The interval around the true result that a formula's permits.
+    /// The interval around the true result that a formula's interval permits.
     pub fn inherited(self, truth: f64, formula: Maybe) -> Maybe {
         let formula = formula?;
         let error = (truth - formula.low)
             .abs()
             .max((truth - formula.high).abs());
         (truth.is_finite() && !error.is_nan()).then_some(())?;
-        // The formula's own ends again, since the widened ones are rounded here.
+        // The formula's own ends are included again, because the widened ends are rounded here.
         Some(Interval {
             low: formula.low.min(truth - error),
             high: formula.high.max(truth + error),
         })
     }
 
-    /// Whether a result lies within an interval: in place of what is larger than the largest number, an infinity or the
-    /// largest may come.
+    /// True if a result is within an interval. In place of a value above the largest number, infinity or the largest
+    /// number is accepted.
     pub fn permits(self, interval: Interval, found: f64) -> bool {
         let largest = self.largest();
         interval.has(found)

@@ -1,4 +1,4 @@
-//! A table's row: one instruction, what it is tried with, and what must come of it.
+//! A row of a test table: one instruction, its operands and its expected results.
 
 use super::assembler::{Assembler, Id};
 use super::inputs::{self, Domain};
@@ -10,19 +10,19 @@ use rand_chacha::ChaCha8Rng;
 use spirv::{BuiltIn, Capability, ExecutionMode, Op, StorageClass};
 use std::borrow::Cow;
 
-/// Invocations that run each row.
+/// The number of invocations that run each row.
 pub const LANES: usize = 1024;
-/// Invocations of a workgroup.
+/// The number of invocations of a workgroup.
 pub const WORKGROUP: usize = 64;
-/// Rows of a shader.
+/// The number of rows of a shader.
 const ROWS_PER_MODULE: usize = 24;
 
-/// What must come of a component.
+/// The expected value of a component.
 #[derive(Clone, Debug)]
 pub enum Expect {
     /// It is undefined.
     Any,
-    /// These bits; for a float that isn't a number, any such.
+    /// These bits; if they are a NaN, any NaN.
     Is(u64),
     /// One of these.
     OneOf(Vec<u64>),
@@ -61,21 +61,21 @@ impl Expect {
     }
 }
 
-/// An invocation's operands: the components' bits of each.
+/// An invocation's operands: for each, the bits of its components.
 pub type Lane = Vec<Vec<u64>>;
 
 type LaneModel = dyn Fn(&[Vec<u64>]) -> Vec<Expect>;
 type SubgroupModel = dyn Fn(&[Lane], usize) -> Vec<Expect>;
 
-/// Says what must come of a row: the components of all results in order.
+/// A function that gives the expected components of all results of a row, in order.
 pub enum Model {
-    /// From an invocation's own operands.
+    /// The results depend on the invocation's own operands.
     Lane(Box<LaneModel>),
-    /// From those of its subgroup, and which of them is the invocation.
+    /// The results depend on the operands of the whole subgroup, and on the invocation's index in it.
     Subgroup(Box<SubgroupModel>),
 }
 
-/// What a row's instructions are emitted into.
+/// The function body into which a row's instructions are emitted.
 pub struct Body {
     /// The module.
     pub asm: Assembler,
@@ -91,12 +91,12 @@ impl Body {
         ty.declare(&mut self.asm)
     }
 
-    /// A pointer to memory of the invocation's own, in a storage buffer, of a kind of 32 or 64 bits.
+    /// A pointer to a private cell of the invocation, in a storage buffer, of a kind of 32 or 64 bits.
     pub fn cell(&mut self, kind: Kind) -> Id {
         let wide = kind.bits() == 64;
         let element = self.ty(Ty::scalar(if wide { Kind::U64 } else { Kind::U32 }));
         let first = self.asm.u32(self.cells * LANES as u32);
-        // In units of 64 bits, so that cells of either size have their places.
+        // The unit is 64 bits, so that a cell of either size fits.
         self.cells += 1;
         let u32_ty = self.ty(Ty::scalar(Kind::U32));
         let mut index = self.asm.emit(Op::IAdd, u32_ty, &[first, self.lane]);
@@ -126,7 +126,7 @@ impl Body {
 
 type Emit = dyn Fn(&mut Body, &[Id]) -> Vec<Id>;
 
-/// An instruction, what it is tried with, and what must come of it.
+/// An instruction, its operands and its expected results.
 pub struct Row {
     /// Its name.
     pub name: String,
@@ -134,11 +134,11 @@ pub struct Row {
     pub operands: Vec<(Ty, Domain)>,
     /// Its results' types.
     pub results: Vec<Ty>,
-    /// Emits it: from the operands' ids, those of the results.
+    /// Emits the instruction: takes the ids of the operands and returns the ids of the results.
     pub emit: Box<Emit>,
-    /// What must come of it.
+    /// The expected results.
     pub model: Model,
-    /// Whether denormal operands and results may be flushed to zero where the device doesn't preserve them.
+    /// True if denormal operands and results may be flushed to zero on a device that does not preserve them.
     pub flushes: bool,
 }
 
@@ -159,7 +159,7 @@ impl Row {
         }
     }
 
-    /// The lanes' operands; the same ones each time.
+    /// The operands of the lanes, the same ones each time.
     fn inputs(&self) -> Vec<Lane> {
         let seed = self
             .name
@@ -188,21 +188,21 @@ fn words_of(types: impl Iterator<Item = Ty>) -> usize {
         .sum::<usize>()
 }
 
-/// A row that gave what it must not.
+/// A row with wrong results.
 #[derive(Clone, Debug)]
 pub struct Failure {
     /// The row's name.
     pub row: String,
-    /// How many lanes did.
+    /// The number of lanes with wrong results.
     pub lanes: usize,
-    /// The first of them, in words.
+    /// A description of the first of them.
     pub example: String,
 }
 
 /// Runs all rows on a device.
 ///
 /// # Errors
-/// What Vulkan refused, with the rows of that shader.
+/// The error of Vulkan, with the rows of the refused shader.
 pub fn check(context: &Context, rows: &[Row]) -> Result<Vec<Failure>, (Refused, Vec<String>)> {
     let mut failures = Vec::new();
     for rows in rows.chunks(ROWS_PER_MODULE) {
@@ -354,7 +354,7 @@ fn describe(row: &Row, lane: &Lane, found: &[(Kind, u64)], expected: &[Expect]) 
     )
 }
 
-/// The shader of some rows, and how many cells of scratch memory an invocation has.
+/// The shader of some rows, and the number of scratch cells of an invocation.
 fn assemble(rows: &[Row], preserve_denormals: bool) -> (Vec<u32>, u32) {
     let mut asm = Assembler::new(WORKGROUP as u32);
     asm.extension("SPV_KHR_float_controls");
@@ -422,7 +422,7 @@ fn assemble(rows: &[Row], preserve_denormals: bool) -> (Vec<u32>, u32) {
     (asm.finish(), body.cells)
 }
 
-/// The buffers of operands and results: word k of all lanes, then word k + 1.
+/// The layout of the buffers of operands and results: word k of all lanes, then word k + 1.
 struct Memory {
     input: Id,
     output: Id,
@@ -529,7 +529,7 @@ impl Memory {
     }
 }
 
-/// The unsigned integer of as many bits.
+/// The unsigned integer kind with the same number of bits.
 fn integer_of(kind: Kind) -> Kind {
     match kind {
         Kind::F16 => Kind::U16,

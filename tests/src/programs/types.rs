@@ -4,7 +4,7 @@ use super::assembler::{Assembler, Id};
 use half::f16;
 use spirv::{Capability, Op};
 
-/// What a component is.
+/// The type of a component.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[allow(missing_docs, reason = "the names say it")]
 pub enum Kind {
@@ -24,12 +24,12 @@ pub enum Kind {
 use Kind::{Bool, F16, F32, F64, I8, I16, I32, I64, U8, U16, U32, U64};
 
 impl Kind {
-    /// All integers.
+    /// All integer kinds.
     pub const INTEGERS: [Self; 8] = [U8, I8, U16, I16, U32, I32, U64, I64];
-    /// All floats.
+    /// All float kinds.
     pub const FLOATS: [Self; 3] = [F16, F32, F64];
 
-    /// Its bits; 1 for a truth value.
+    /// The number of bits; 1 for a Boolean.
     pub fn bits(self) -> u32 {
         match self {
             Bool => 1,
@@ -40,27 +40,27 @@ impl Kind {
         }
     }
 
-    /// How many words of a buffer it takes.
+    /// The number of buffer words that a component takes.
     pub fn words(self) -> u32 {
         self.bits().div_ceil(32)
     }
 
-    /// Whether it is a float.
+    /// True if it is a float.
     pub fn is_float(self) -> bool {
         matches!(self, F16 | F32 | F64)
     }
 
-    /// Whether it is a signed integer.
+    /// True if it is a signed integer.
     pub fn is_signed(self) -> bool {
         matches!(self, I8 | I16 | I32 | I64)
     }
 
-    /// Whether it is an integer.
+    /// True if it is an integer.
     pub fn is_integer(self) -> bool {
         !self.is_float() && self != Bool
     }
 
-    /// The integer of as many bits, or itself.
+    /// The integer kind with the same number of bits and the given signedness; other kinds are unchanged.
     pub fn with_sign(self, signed: bool) -> Self {
         match (self.bits(), signed) {
             (8, false) => U8,
@@ -75,7 +75,7 @@ impl Kind {
         }
     }
 
-    /// The bits, and nothing above them.
+    /// The mask of its bits.
     pub fn mask(self) -> u64 {
         u64::MAX >> (64 - self.bits())
     }
@@ -104,7 +104,7 @@ impl Kind {
         }
     }
 
-    /// The float next to a value, as bits.
+    /// The bits of the float nearest to a value.
     pub fn round(self, value: f64) -> u64 {
         match self {
             F16 => u64::from(f16::from_f32(rounded_to_odd(value)).to_bits()),
@@ -149,8 +149,8 @@ impl Kind {
     }
 }
 
-/// A single-precision number next to a value from which rounding further to half precision goes the same way: the
-/// inexact ones are made odd.
+/// A single-precision number next to a value, rounded to odd: inexact results get an odd significand. Rounding it
+/// further to half precision gives the same result as rounding the value directly.
 fn rounded_to_odd(value: f64) -> f32 {
     let near = value as f32;
     if value.is_nan() || f64::from(near) == value {
@@ -160,14 +160,14 @@ fn rounded_to_odd(value: f64) -> f32 {
     f32::from_bits(bits | 1)
 }
 
-/// A scalar, a vector or a matrix.
+/// A scalar, vector or matrix type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Ty {
-    /// Its components.
+    /// The kind of its components.
     pub kind: Kind,
-    /// Components of a column: 1 for a scalar.
+    /// The number of components of a column: 1 for a scalar.
     pub rows: u32,
-    /// Columns: 1 for a scalar or a vector.
+    /// The number of columns: 1 for a scalar or a vector.
     pub columns: u32,
 }
 
@@ -191,17 +191,17 @@ impl Ty {
         }
     }
 
-    /// How many components it has.
+    /// The number of its components.
     pub fn count(self) -> usize {
         (self.rows * self.columns) as usize
     }
 
-    /// The same shape of other components.
+    /// The same shape with another component kind.
     pub fn of(self, kind: Kind) -> Self {
         Self { kind, ..self }
     }
 
-    /// Its id in a module.
+    /// Declares the type in a module and returns its id.
     pub fn declare(self, to: &mut Assembler) -> Id {
         let mut id = self.kind.declare(to);
         if self.rows > 1 {

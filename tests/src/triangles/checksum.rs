@@ -1,8 +1,8 @@
-//! Which samples which triangles cover, as sums that don't depend on order.
+//! Checksums of the triangles that cover each sample, independent of the order of drawing.
 //!
-//! Every fragment adds four numbers of 12 bits, made from its triangle's number, to a sample's
-//! sums. A sum of up to 4,096 of them is exact in a 32-bit float, so that equal sums of two devices
-//! mean equal sets of triangles, but for one chance in 2^48.
+//! Every fragment adds four numbers of 12 bits, made from its triangle's number, to a sample's sums. A sum of up to
+//! 4,096 of them is exact in a 32-bit float. Therefore equal sums on two devices mean equal sets of triangles, except
+//! with a probability of 2^-48.
 
 use ash::vk;
 
@@ -16,7 +16,7 @@ const VERTEX: &str = "
     layout(location = 0) flat out uint number;
     void main() { gl_Position = position; number = gl_VertexIndex / 3; }";
 
-/// The same arithmetic as [`numbers`].
+/// The fragment shader, with the same arithmetic as [`numbers`].
 const FRAGMENT: &str = "
     layout(location = 0) flat in uint number;
     layout(location = 0) out vec4 sums;
@@ -29,7 +29,7 @@ const FRAGMENT: &str = "
         sums = vec4(a & 0xfffu, (a >> 12) & 0xfffu, b & 0xfffu, (b >> 12) & 0xfffu);
     }";
 
-/// What a triangle adds to each sample that it covers.
+/// The numbers that a triangle adds to each sample that it covers.
 pub fn numbers(triangle: u32) -> [f32; 4] {
     let mixed = |mut x: u32| {
         x ^= x >> 16;
@@ -52,7 +52,7 @@ pub struct Checksums {
 }
 
 impl Checksums {
-    /// Makes them ready to be drawn to `size` pixels of `samples` samples.
+    /// Prepares them for drawing to `size` pixels of `samples` samples.
     pub fn new(gpu: &Gpu, triangles: &[[[f32; 4]; 3]], size: [u32; 2], samples: u32) -> Self {
         let options = TargetOptions {
             size,
@@ -99,8 +99,8 @@ impl Checksums {
     }
 }
 
-/// The first of `count` triangles that covers other samples on one device than on the other, found
-/// by halving, with one such sample and pixel.
+/// The first of `count` triangles that covers different samples on two devices, found by bisection, with one such
+/// sample and pixel.
 pub fn first_difference(
     ours: &Checksums,
     theirs: &Checksums,
@@ -125,7 +125,7 @@ pub fn first_difference(
         } else if let Some(found) = differs(middle..range.end) {
             (range, place) = (middle..range.end, found);
         } else {
-            // The halves agree, so that it takes both to differ.
+            // Each half agrees, so the difference needs both halves.
             break;
         }
     }

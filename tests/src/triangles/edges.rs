@@ -1,9 +1,8 @@
-//! How far a sample is from a triangle's edges, in exact arithmetic.
+//! The distance of a sample from a triangle's edges, in exact arithmetic.
 //!
-//! Positions are whole multiples of 1/64 in clip coordinates. An edge of the projected triangle is
-//! the line of the points (X, Y, 1) whose product with the cross product of its ends' (x, y, w) is
-//! zero, whichever side of the eye the ends are on; where the near or the far plane cuts the
-//! triangle there is one line more.
+//! Positions are integer multiples of 1/64 in clip coordinates. An edge of the projected triangle is the line of the
+//! points (X, Y, 1) whose product with the cross product of its ends' (x, y, w) is zero, also if an end is behind the
+//! eye. The near or the far plane adds one line where it cuts the triangle.
 
 /// Units of a clip coordinate.
 pub const UNITS: i64 = 64;
@@ -11,7 +10,7 @@ pub const UNITS: i64 = 64;
 /// A position in units.
 pub type Position = [i64; 4];
 
-/// The position as a device takes it; exact.
+/// The position in clip coordinates, as floats; exact.
 pub fn to_clip(position: Position) -> [f32; 4] {
     position.map(|coordinate| coordinate as f32 / UNITS as f32)
 }
@@ -35,7 +34,7 @@ fn dot(a: Line, b: Line) -> i128 {
 pub fn lines(triangle: &[Position; 3]) -> [Line; 5] {
     let points = triangle.map(|[x, y, _, w]| [x, y, w].map(i128::from));
     let edges = [(1, 2), (2, 0), (0, 1)].map(|(i, j)| cross(points[i], points[j]));
-    // What is z times the determinant over w at a point of the screen is linear there.
+    // z times the determinant, over w, is linear in the point of the screen.
     let mut near = [0; 3];
     for (edge, position) in edges.iter().zip(triangle) {
         for axis in 0..3 {
@@ -47,8 +46,8 @@ pub fn lines(triangle: &[Position; 3]) -> [Line; 5] {
     [edges[0], edges[1], edges[2], near, far]
 }
 
-/// Whether a triangle with w = 1 covers the sample at `x` and `y`, in sixteenths of a pixel, of a square of `size`
-/// pixels: inside, or on an edge that is a left or a top one.
+/// True if a triangle with w = 1 covers the sample at `x` and `y`, in sixteenths of a pixel, of a square of `size`
+/// pixels: it is inside, or on a left or top edge.
 pub fn covers(triangle: &[Position; 3], size: u32, [x, y]: [u32; 2]) -> bool {
     let points = triangle.map(|[x, y, _, w]| [x, y, w].map(i128::from));
     let [a, b, c, ..] = lines(triangle);
@@ -58,15 +57,15 @@ pub fn covers(triangle: &[Position; 3], size: u32, [x, y]: [u32; 2]) -> bool {
     let sample = [along(x), along(y), denominator];
     turn != 0
         && [a, b, c].iter().all(|&line| {
-            // Grows towards the inside; y points down.
+            // The value grows towards the inside; y points down.
             let line = line.map(|part| turn * part);
             let inside = dot(line, sample);
             inside > 0 || inside == 0 && (line[0] > 0 || line[0] == 0 && line[1] > 0)
         })
 }
 
-/// Whether the sample at `x` and `y`, in sixteenths of a pixel, of a square of `size` pixels lies
-/// within 1/256 of a pixel from a line.
+/// True if the sample at `x` and `y`, in sixteenths of a pixel, of a square of `size` pixels is within 1/256 of a pixel
+/// from a line.
 pub fn is_near(line: Line, size: u32, [x, y]: [u32; 2]) -> bool {
     // The sample is at (X, Y, D) / D in normalised device coordinates.
     let denominator = 16 * i128::from(size);

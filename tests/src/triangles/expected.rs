@@ -1,7 +1,7 @@
-//! What is expected to differ, and what this driver cannot do yet: two checked-in lists.
+//! Two checked-in lists: expected differences from lavapipe, and scenes that this driver does not support.
 //!
-//! A scene that is listed as missing and is drawn right fails, so that the list says no more than is
-//! true. An exception may be one that nothing needs here, since what lavapipe rounds depends on its processor.
+//! A scene that is listed as unsupported but is drawn correctly fails, so that the list stays up to date. An exception
+//! may be unused on one machine, since lavapipe's rounding depends on the processor.
 
 use std::path::Path;
 
@@ -16,18 +16,18 @@ pub struct Exception {
     pub picture: String,
     /// The most texels that may differ.
     pub texels: usize,
-    /// How far they may differ, in limits of the format.
+    /// The greatest difference, in multiples of the format's limit.
     pub limits: f64,
-    /// The clause that permits it.
+    /// The clause of the specification that permits it.
     pub clause: String,
 }
 
-/// The lists.
+/// The two lists.
 #[derive(Clone, Debug, Default)]
 pub struct Expected {
     /// Differences that the specification permits.
     pub exceptions: Vec<Exception>,
-    /// Scenes that this driver cannot draw yet, and why.
+    /// Scenes that this driver cannot draw yet, with the reasons.
     pub unsupported: Vec<(String, String)>,
 }
 
@@ -35,7 +35,7 @@ impl Expected {
     /// Reads the lists.
     ///
     /// # Panics
-    /// If they aren't there, or a line is not understood.
+    /// If a list is missing, or a line is invalid.
     pub fn read() -> Self {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("expected_failures");
         let read = |name| std::fs::read_to_string(folder.join(name)).expect("a checked-in list");
@@ -66,7 +66,7 @@ impl Expected {
         }
     }
 
-    /// Why a scene cannot be drawn yet, if it is listed.
+    /// The reason for which a scene cannot be drawn yet, if it is listed.
     pub fn unsupported(&self, scene: &str) -> Option<&str> {
         let mut found = self.unsupported.iter().filter(|(name, _)| name == scene);
         found.next().map(|(_, reason)| reason.as_str())
@@ -78,7 +78,7 @@ impl Expected {
         (self.exceptions.iter()).filter(move |exception| exception.scene == scene)
     }
 
-    /// Every scene that is named.
+    /// The names of all listed scenes.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         let exceptions = self.exceptions.iter().map(|exception| &*exception.scene);
         exceptions.chain(self.unsupported.iter().map(|(name, _)| &**name))
@@ -86,12 +86,12 @@ impl Expected {
 }
 
 impl Exception {
-    /// Whether it speaks of a picture.
+    /// True if it applies to a picture.
     pub fn covers(&self, picture: &str) -> bool {
         self.picture == "*" || self.picture == picture
     }
 
-    /// Whether a difference of its picture is no greater than it says.
+    /// True if a difference of its picture is within its limits.
     pub fn excuses(&self, difference: &Difference) -> bool {
         self.covers(&difference.picture)
             && difference.texels <= self.texels
@@ -99,7 +99,7 @@ impl Exception {
     }
 }
 
-/// Lines of fields between bars; those that begin with `#` are comments.
+/// The lines of a list, split at bars; lines that begin with `#` are comments.
 fn lines(text: &str) -> impl Iterator<Item = Vec<&str>> {
     let lines = text.lines().map(str::trim);
     lines

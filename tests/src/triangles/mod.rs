@@ -1,8 +1,7 @@
 //! Scenes of triangles that run unchanged on this driver and on lavapipe.
 //!
-//! A [`Scene`] is one function of a [`Gpu`]: it creates what it needs, records, submits, and returns
-//! the images that it drew. Everything here is an ordinary application of Vulkan; [`gaurast_testkit`] says what its
-//! `unsafe` relies on.
+//! A [`Scene`] is a function of a [`Gpu`]. It creates its objects, records, submits, and returns the images that it
+//! drew. The code is an ordinary Vulkan application; [`gaurast_testkit`] explains the safety of its `unsafe`.
 
 pub mod checksum;
 pub mod edges;

@@ -1,4 +1,4 @@
-//! Real models: their triangles, textures, and how they are lit and looked at.
+//! Triangle models from files: their triangles and textures, their lighting and their views.
 
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
@@ -31,13 +31,13 @@ pub struct Corner {
 pub struct Part {
     /// Its corners.
     pub corners: Vec<Corner>,
-    /// Three for each triangle.
+    /// Indices of corners, three for each triangle.
     pub indices: Vec<u32>,
-    /// Colours.
+    /// The colour texture.
     pub diffuse: RgbaImage,
-    /// Normals in the model's space, instead of the corners'.
+    /// Normals in the model's space, which replace those of the corners.
     pub normals: Option<RgbaImage>,
-    /// How much light is reflected as by a mirror, in the first channel.
+    /// The share of specular reflection, in the first channel.
     pub specular: Option<RgbaImage>,
 }
 
@@ -52,7 +52,7 @@ fn missing(path: &Path) -> impl Fn(String) -> Missing {
     move |error| Missing(format!("{path}: {error}"))
 }
 
-/// The path of a file of the real data.
+/// The path of a file of the test data.
 fn in_data(name: &str) -> Result<PathBuf, Missing> {
     let folder = gaurast_runner::data_folder();
     let folder =
@@ -65,17 +65,17 @@ fn grey() -> RgbaImage {
 }
 
 impl Model {
-    /// The head's file within the real data.
+    /// The path of the head's file in the test data.
     pub const AFRICAN_HEAD: &str = "meshes/african_head/african_head.obj";
-    /// The duck's.
+    /// The path of the duck's file.
     pub const DUCK: &str = "meshes/Duck.glb";
-    /// The bunny's.
+    /// The path of the bunny's file.
     pub const BUNNY: &str = "meshes/bunny.ply";
 
     /// The head with its eyes: three OBJ files with TGA textures.
     ///
     /// # Errors
-    /// [`Missing`] if a file is not there.
+    /// [`Missing`] if a file is missing.
     pub fn african_head() -> Result<Self, Missing> {
         let head = in_data(Self::AFRICAN_HEAD)?;
         let texture = |name: String| {
@@ -102,7 +102,7 @@ impl Model {
     /// The duck: a binary glTF file with its texture.
     ///
     /// # Errors
-    /// [`Missing`] if it is not there.
+    /// [`Missing`] if the file is missing.
     pub fn duck() -> Result<Self, Missing> {
         let path = in_data(Self::DUCK)?;
         let missing = missing(&path);
@@ -149,7 +149,7 @@ impl Model {
     /// The bunny: a text PLY file without normals or colours.
     ///
     /// # Errors
-    /// [`Missing`] if it is not there.
+    /// [`Missing`] if the file is missing.
     pub fn bunny() -> Result<Self, Missing> {
         let path = in_data(Self::BUNNY)?;
         let missing = missing(&path);
@@ -184,7 +184,7 @@ impl Model {
         Ok(Self { parts: vec![part] })
     }
 
-    /// The middle of the box around it, and half the box's diagonal.
+    /// The centre of the bounding box, and half of its diagonal.
     fn bounds(&self) -> (Vec3, f32) {
         let corners = self.parts.iter().flat_map(|part| &part.corners);
         let positions = corners.map(|corner| Vec3::from(corner.position));
@@ -211,7 +211,7 @@ fn read_obj(path: &Path) -> Result<(Vec<Corner>, Vec<u32>), Missing> {
         corners.extend((0..mesh.positions.len() / 3).map(|index| Corner {
             position: triple(&mesh.positions, index),
             normal: triple(&mesh.normals, index),
-            // OBJ counts from the bottom.
+            // OBJ counts texture coordinates from the bottom.
             uv: [
                 mesh.texcoords[2 * index],
                 1.0 - mesh.texcoords[2 * index + 1],
@@ -237,7 +237,7 @@ fn smooth_normals(corners: &mut [Corner], indices: &[u32]) {
     }
 }
 
-/// An image and its levels, each a quarter of the one before, by averages.
+/// An image and its mipmap levels, each with a quarter of the texels of the one before, by averaging.
 fn levels(image: &RgbaImage) -> Vec<Vec<[u8; 4]>> {
     let mut image = image.clone();
     let texels = |image: &RgbaImage| image.pixels().map(|pixel| pixel.0).collect();
@@ -258,7 +258,7 @@ fn levels(image: &RgbaImage) -> Vec<Vec<[u8; 4]>> {
     levels
 }
 
-/// What both stages are told.
+/// The uniforms of both stages.
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 struct Uniforms {
@@ -321,7 +321,7 @@ pub struct Ready {
 }
 
 impl Ready {
-    /// Makes it ready to be drawn to `target`, seen from `direction`.
+    /// Prepares the model for drawing to `target`, seen from `direction`.
     pub fn new(gpu: &Gpu, target: &Target, model: &Model, direction: Vec3) -> Self {
         let uniforms = Buffer::of(gpu, &[uniforms(model, target.options.size, direction)]);
         let sampler = vk::SamplerCreateInfo::default()
@@ -364,7 +364,7 @@ fn uniforms(model: &Model, [width, height]: [u32; 2], direction: Vec3) -> Unifor
     }
 }
 
-/// From the world to a camera at `eye` that looks at `middle`: x to the right, y down, z forward.
+/// The matrix from world space to a camera at `eye` that looks at `middle`: x to the right, y down, z forward.
 fn look_at(eye: Vec3, middle: Vec3) -> Mat4 {
     let forward = (middle - eye).normalize();
     let right = forward.cross(Vec3::Y).normalize();
@@ -373,7 +373,7 @@ fn look_at(eye: Vec3, middle: Vec3) -> Mat4 {
     Mat4::from_cols(row(right), row(down), row(forward), Vec4::W).transpose()
 }
 
-/// From that camera to clip coordinates.
+/// The matrix from that camera to clip coordinates.
 fn perspective(aspect: f32, near: f32, far: f32) -> Mat4 {
     let focal = 2.4;
     let depth = far / (far - near);

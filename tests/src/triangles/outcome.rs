@@ -1,8 +1,8 @@
-//! What becomes of a scene.
+//! The result of a scene.
 
 use gaurast_testkit::Output;
 
-/// What a scene leaves behind, unless the device lacks an optional feature that it needs.
+/// The pictures of a scene, or the optional feature that it needs and the device lacks.
 pub type Drawn = Result<Output, Missing>;
 
 /// An optional feature that a device does not have.

@@ -5,7 +5,7 @@ use rand_chacha::ChaCha8Rng;
 
 use gaurast_testkit::Vertex;
 
-/// A source of numbers that is the same everywhere.
+/// A random number generator with the same sequence on all machines.
 pub fn rng(seed: u64) -> ChaCha8Rng {
     ChaCha8Rng::seed_from_u64(seed)
 }
@@ -30,7 +30,7 @@ pub fn soup(seed: u64, triangles: usize) -> Vec<Vertex> {
     vertices
 }
 
-/// The same without perspective.
+/// The same triangles without perspective.
 pub fn flat_soup(seed: u64, triangles: usize) -> Vec<Vertex> {
     let mut vertices = soup(seed, triangles);
     for vertex in &mut vertices {
@@ -72,7 +72,7 @@ pub fn whole(z: f32, color: [f32; 4]) -> Vec<Vertex> {
     rectangle([-1.0, -1.0, 1.0, 1.0], z, color)
 }
 
-/// A zigzag over the target, as a triangle strip of `count` vertices.
+/// A zigzag across the target, as a triangle strip of `count` vertices.
 pub fn zigzag(seed: u64, count: usize) -> Vec<Vertex> {
     let mut rng = rng(seed);
     (0..count)

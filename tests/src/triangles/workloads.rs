@@ -1,4 +1,4 @@
-//! Work to measure: scenes that are prepared once and submitted again and again.
+//! Workloads for measurements: scenes that are prepared once and submitted many times.
 
 use ash::vk;
 use glam::Vec3;
@@ -26,19 +26,19 @@ pub const NAMES: [&str; 9] = [
 
 const SIZE: [u32; 2] = [1920, 1080];
 
-/// Commands with all that they use.
+/// Commands with all objects that they use.
 pub struct Workload {
-    // Before what it uses.
+    // Dropped before the objects that it uses.
     commands: Recorded,
     _target: Target,
     _things: Box<dyn std::any::Any>,
 }
 
 impl Workload {
-    /// Prepares the workload of a name.
+    /// Prepares the workload named `name`.
     ///
     /// # Errors
-    /// [`Missing`] if it needs a file that is not there.
+    /// [`Missing`] if it needs a file that is missing.
     ///
     /// # Panics
     /// If the device cannot do it, or there is no such name.
@@ -46,7 +46,7 @@ impl Workload {
         Self::smaller(gpu, name, 1)
     }
 
-    /// As [`Workload::new`], with width, height and numbers of triangles divided by `by`.
+    /// Prepares it as [`Workload::new`] does, with width, height and numbers of triangles divided by `by`.
     ///
     /// # Errors
     /// As [`Workload::new`].
@@ -95,7 +95,7 @@ impl Workload {
         Ok(workload)
     }
 
-    /// Does the work and waits for its end.
+    /// Submits the work and waits for its completion.
     pub fn run(&self) {
         self.commands.submit();
     }
@@ -123,7 +123,7 @@ impl Workload {
         }
     }
 
-    /// A million vertices, shared by twice as many triangles that are too small to be seen.
+    /// A million vertices, shared by twice as many triangles that are too small to be visible.
     fn vertices(gpu: &Gpu, target: &TargetOptions, by: u32) -> Self {
         let side = 1000 / by;
         let target = Target::new(gpu, target);
@@ -162,7 +162,7 @@ impl Workload {
         }
     }
 
-    /// The whole target, sampled with all of a texture's levels in use.
+    /// Textures the whole target, with all levels of the texture in use.
     fn textured(gpu: &Gpu, target: &TargetOptions) -> Self {
         const SIDE: u32 = 1024;
         let target = Target::new(gpu, target);
@@ -191,7 +191,7 @@ impl Workload {
             ..PipelineOptions::default()
         };
         let pipeline = Pipeline::new(gpu, &target, &options);
-        // Perspective, so that the texture is enlarged on one side and shrunk on the other.
+        // Perspective, so that the texture is magnified on one side and minified on the other.
         let corners = [
             [-1.0, -1.0, 1.0],
             [1.0, -1.0, 1.0],
@@ -233,7 +233,7 @@ impl Workload {
     }
 }
 
-/// One triangle of half the target.
+/// One triangle that covers half of the target.
 fn one_big() -> Vec<Vertex> {
     [[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0]]
         .map(|[x, y]| Vertex {
@@ -262,7 +262,7 @@ fn small(count: usize, size: [u32; 2]) -> Vec<Vertex> {
     vertices
 }
 
-/// The whole target, `count` times.
+/// A rectangle that covers the whole target, `count` times.
 fn layers(count: u8, back_to_front: bool) -> Vec<Vertex> {
     (0..count)
         .flat_map(|layer| {

@@ -4,24 +4,24 @@ use ash::vk;
 
 use crate::gpu::Gpu;
 
-/// What a binding refers to.
+/// The resource to which a binding refers.
 #[derive(Clone, Copy, Debug)]
 pub enum Resource {
     /// A uniform buffer.
     Uniform(vk::Buffer),
-    /// A uniform buffer of some bytes at an offset given when it is bound.
+    /// A uniform buffer of this many bytes, at an offset that is given when the set is bound.
     DynamicUniform(vk::Buffer, u64),
     /// A storage buffer.
     Storage(vk::Buffer),
     /// An image with a sampler.
     Texture(vk::ImageView, vk::Sampler),
-    /// An attachment of the same pass.
+    /// An input attachment of the same pass.
     Input(vk::ImageView),
-    /// An image that programs write to.
+    /// A storage image.
     StorageImage(vk::ImageView),
-    /// The texels of a buffer.
+    /// A uniform texel buffer.
     Texels(vk::BufferView),
-    /// The texels of a buffer that programs write to.
+    /// A storage texel buffer.
     StoredTexels(vk::BufferView),
 }
 
@@ -62,7 +62,7 @@ pub struct Bindings {
 }
 
 impl Bindings {
-    /// Creates it. What it refers to must outlive it.
+    /// Creates the set. The resources must outlive it.
     pub fn new(gpu: &Gpu, resources: &[Resource]) -> Self {
         let entries: Vec<_> = (0..)
             .zip(resources)
@@ -163,10 +163,10 @@ impl Drop for Bindings {
     }
 }
 
-/// A binding: its number, what it holds and how many.
+/// A binding: its number, descriptor type and count.
 pub type Binding = (u32, vk::DescriptorType, u32);
 
-/// Layouts of descriptor sets for compute shaders, and a pool with room for one set of each.
+/// Layouts of descriptor sets for compute shaders, and a pool for one set of each.
 pub struct Sets {
     /// The layouts.
     pub layouts: Vec<vk::DescriptorSetLayout>,
@@ -176,14 +176,14 @@ pub struct Sets {
 }
 
 impl Sets {
-    /// Layouts of sets that have these bindings.
+    /// Creates layouts of sets with these bindings, and the pool.
     pub fn new(gpu: &Gpu, sets: &[&[Binding]]) -> Self {
         let none = vk::DescriptorSetLayoutCreateFlags::empty();
         let layouts = sets.iter().map(|set| set_layout(gpu, set, none));
         Self::of(gpu, layouts.collect(), sets)
     }
 
-    /// These layouts, of sets that have these bindings.
+    /// Creates the pool for these layouts, whose sets have these bindings.
     pub fn of(gpu: &Gpu, layouts: Vec<vk::DescriptorSetLayout>, sets: &[&[Binding]]) -> Self {
         let sizes: Vec<_> = (sets.iter().copied().flatten())
             .map(|&(_, ty, count)| {
@@ -204,7 +204,7 @@ impl Sets {
         }
     }
 
-    /// A set of each layout.
+    /// Allocates a set of each layout.
     pub fn allocate(&self) -> Vec<vk::DescriptorSet> {
         let info = vk::DescriptorSetAllocateInfo::default()
             .descriptor_pool(self.pool)
@@ -250,7 +250,7 @@ pub fn set_layout(
     unsafe { gpu.device().create_descriptor_set_layout(&info, None) }.expect("a set layout")
 }
 
-/// Writes buffers' descriptors from a binding's element on.
+/// Writes descriptors of buffers, starting at an array element of a binding.
 pub fn write(
     gpu: &Gpu,
     set: vk::DescriptorSet,

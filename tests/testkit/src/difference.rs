@@ -1,4 +1,4 @@
-//! Holding the triangles that two devices drew against each other.
+//! Comparison of the pictures that two devices drew with triangles.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -12,18 +12,18 @@ use gaurast_oracle::compare::PictureError;
 use crate::output::{Output, Picture};
 use crate::resource::texel_size;
 
-/// How one picture of two devices differs.
+/// The difference of one picture between two devices.
 #[derive(Clone, Debug)]
 pub struct Difference {
     /// The picture's name.
     pub picture: String,
     /// Texels that differ by more than the format's limit.
     pub texels: usize,
-    /// The greatest difference, in limits.
+    /// The greatest difference, in multiples of the limit.
     pub worst: f64,
-    /// Where that is.
+    /// The texel with the greatest difference: x and y.
     pub place: [u32; 2],
-    /// The components there: those of the first output, and of the second.
+    /// The components of that texel: in the first output, and in the second.
     pub components: [Vec<f64>; 2],
 }
 
@@ -39,11 +39,17 @@ impl fmt::Display for Difference {
     }
 }
 
-/// The pictures that differ by more than their formats allow.
+/// Returns the pictures that differ by more than their formats allow.
 ///
-/// The limits: 1 for a component of 8 bits or fewer (2 of an sRGB format, whose curve is steep near
-/// black), integers none, floats 1e-4 and half floats 1e-3 of their magnitude or of 1, depth two
-/// units of the format or, as a float, 1e-6.
+/// The limits by kind of component:
+///
+/// | component | limit |
+/// |---|---|
+/// | of 8 bits or fewer | 1, or 2 in an sRGB format, whose curve is steep near black |
+/// | integer | 0 |
+/// | float | 1e-4 of the magnitude or of 1 |
+/// | half float | 1e-3 of the magnitude or of 1 |
+/// | depth | two units of the format, or 1e-6 for a float |
 ///
 /// # Panics
 /// If the outputs don't have the same pictures.
@@ -55,7 +61,7 @@ pub fn differences(ours: &Output, theirs: &Output) -> Vec<Difference> {
         .collect()
 }
 
-/// How the pictures differ, if any texel exceeds its limit.
+/// The difference of two pictures, or `None` if every texel is within its limit.
 pub fn difference(ours: &Picture, theirs: &Picture) -> Option<Difference> {
     assert_eq!(ours.name, theirs.name);
     assert_eq!((ours.format, ours.size), (theirs.format, theirs.size));
@@ -89,8 +95,8 @@ fn texels(picture: &Picture) -> impl Iterator<Item = &[u8]> {
         .chunks_exact(texel_size(picture.format) as usize)
 }
 
-/// The greatest difference of a component, in limits. Numbers that aren't are equal to each other
-/// and infinitely far from all else.
+/// The greatest difference of a component, in multiples of the limit. NaN equals NaN and is infinitely far from
+/// numbers.
 fn distance(format: vk::Format, first: &[u8], second: &[u8]) -> f64 {
     if first == second {
         return 0.0;
@@ -118,16 +124,16 @@ fn distance(format: vk::Format, first: &[u8], second: &[u8]) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// How far components may be apart.
+/// The limit on the difference of a component.
 #[derive(Clone, Copy)]
 enum Limit {
-    /// This far.
+    /// An absolute difference.
     Absolute(f64),
-    /// This share of their magnitude, or of 1 if that is less.
+    /// A share of the magnitude, or of 1 if the magnitude is less.
     Relative(f64),
 }
 
-/// A texel's components, unscaled, and how far they may be apart.
+/// A texel's components, unscaled, and the limit on their differences.
 fn components(format: vk::Format, texel: &[u8]) -> (Vec<f64>, Limit) {
     use vk::Format as F;
     let bytes = || texel.iter().map(|&byte| f64::from(byte)).collect();
@@ -172,7 +178,7 @@ fn floats(words: impl Iterator<Item = u32>) -> Vec<f64> {
     words.map(|word| f64::from(f32::from_bits(word))).collect()
 }
 
-/// Fields of a word from the lowest bits on.
+/// Bit fields of a word, starting from the lowest bits.
 fn fields(word: Option<u32>, widths: &[u32]) -> Vec<f64> {
     let mut word = word.unwrap_or(0);
     let mut field = |&width: &u32| {
@@ -183,8 +189,8 @@ fn fields(word: Option<u32>, widths: &[u32]) -> Vec<f64> {
     widths.iter().map(&mut field).collect()
 }
 
-/// Writes a PNG of three panels for each picture of `differences`: ours, theirs, and where they
-/// differ: grey by less than the limit, red by more.
+/// Writes a PNG of three panels for each picture of `differences`: the first output, the second, and the difference. In
+/// the third, grey is a difference within the limit, and red a greater one.
 ///
 /// # Errors
 /// [`PictureError`] if a file cannot be written.
@@ -209,7 +215,7 @@ pub fn write_differences(
     Ok(paths)
 }
 
-/// A picture of one output, for people.
+/// The picture as 8-bit colours, for people.
 pub fn for_people(picture: &Picture) -> RgbImage {
     let all: Vec<_> = texels(picture).collect();
     let width = picture.size[0];

@@ -3,23 +3,24 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-/// Values that every SIMD level of a test asks for once, by name: the first makes them, and the last takes them away.
+/// Values that every SIMD level of a test requests once, by name. The first request computes a value, and the last one
+/// removes it.
 #[derive(Default)]
 pub struct ForLevels<T>(Mutex<Option<HashMap<String, Shared<T>>>>);
 
-/// A value, or one that is being made, and how many levels have not asked for it.
+/// A value, or its computation in progress, and the number of levels that have not requested it yet.
 struct Shared<T> {
     value: Arc<OnceLock<Arc<T>>>,
     left: usize,
 }
 
 impl<T> ForLevels<T> {
-    /// No values yet.
+    /// An empty set of values.
     pub const fn new() -> Self {
         Self(Mutex::new(None))
     }
 
-    /// The value of a name, by `make` where there is none.
+    /// The value of `name`; `make` computes it if there is none.
     pub fn get(&self, name: &str, make: impl FnOnce() -> T) -> Arc<T> {
         let value = self.ask(name);
         Arc::clone(value.get_or_init(|| Arc::new(make())))
@@ -41,7 +42,7 @@ impl<T> ForLevels<T> {
     }
 }
 
-/// The SIMD levels that this processor has, the simplest first.
+/// The SIMD levels that this processor supports, the simplest first.
 pub fn levels() -> Vec<&'static str> {
     let all = gaurast_runner::SIMD_LEVELS.into_iter();
     all.filter(|level| gaurast_runner::has_simd_level(level))

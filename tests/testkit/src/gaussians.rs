@@ -26,7 +26,7 @@ pub struct GaussianScene {
 }
 
 impl GaussianScene {
-    /// Copies `scene` to the device.
+    /// Creates the vertex buffers of `scene` on the device.
     pub fn new(gpu: &Gpu, scene: &SceneBuffers) -> Self {
         Self {
             buffers: [
@@ -41,7 +41,7 @@ impl GaussianScene {
         }
     }
 
-    /// Copies `scene` to the device as half floats, triples with a fourth component.
+    /// Creates the vertex buffers of `scene` as half floats; triples get a fourth component.
     pub fn half(gpu: &Gpu, scene: &SceneBuffers) -> Self {
         let half = |values: &[f32]| -> Vec<u16> {
             let values = values.iter();
@@ -66,7 +66,7 @@ impl GaussianScene {
         }
     }
 
-    /// Binds what a draw of it needs.
+    /// Binds the scene's vertex buffers and sets the camera.
     ///
     /// # Panics
     /// If the device doesn't draw Gaussians.
@@ -98,52 +98,53 @@ impl GaussianScene {
     }
 }
 
-/// Binds what a pipeline with [`GaussianOptions::instances`] needs besides.
+/// Binds the instance buffer that a pipeline with [`GaussianOptions::instances`] reads.
 pub fn bind_instances(commands: &Commands, instances: &Buffer) {
     commands.vertex_buffer(INSTANCES, instances, 0);
 }
 
-/// What a [`GaussianPipeline`] is made of.
+/// The options of a [`GaussianPipeline`].
 #[derive(Clone)]
 pub struct GaussianOptions<'a> {
-    /// The Gaussian state; its degree and locations are filled in.
+    /// The Gaussian state. The pipeline sets its degree and locations.
     pub state: PipelineGaussianStateCreateInfoGAURAST<'a>,
     /// The degree stored in the scenes that it draws.
     pub stored_degree: u32,
     /// The degree that it draws.
     pub drawn_degree: u32,
-    /// Whether opacity and coefficients advance by instance.
+    /// True if opacity and coefficients advance by instance.
     pub looks_by_instance: bool,
-    /// Whether scenes are stored as half floats.
+    /// True if scenes are stored as half floats.
     pub half: bool,
-    /// Whether there are model matrices and factors of the opacity, and how they advance; see [`Instance`].
+    /// The input rate of model matrices and opacity factors ([`Instance`]), or `None` if there are none.
     pub instances: Option<vk::VertexInputRate>,
-    /// What it draws to.
+    /// The formats of its attachments.
     pub formats: Formats,
-    /// The render pass that it is used in, if it is not dynamic rendering.
+    /// The render pass in which it is used, or `None` for dynamic rendering.
     pub render_pass: Option<vk::RenderPass>,
     /// Depth and stencil tests.
     pub depth_stencil: vk::PipelineDepthStencilStateCreateInfo<'static>,
-    /// Which samples are written.
+    /// The samples that are written.
     pub sample_mask: u32,
-    /// Blending of each colour attachment; those beyond are blended as the first.
+    /// Blending of each colour attachment; further attachments use the first.
     pub blend: Vec<vk::PipelineColorBlendAttachmentState>,
     /// A logic operation instead of blending.
     pub logic_op: Option<vk::LogicOp>,
-    /// Dynamic states beside viewport and scissor.
+    /// Dynamic states in addition to viewport and scissor.
     pub dynamic: Vec<vk::DynamicState>,
 }
 
 /// A model matrix's rows and a factor of the opacity, as bindings of instances hold them.
 pub type Instance = [f32; 13];
 
-/// The binding of [`Instance`]s, and the locations of what they hold.
+/// The binding of [`Instance`]s; their locations follow.
 const INSTANCES: u32 = BINDINGS;
 const MODEL_MATRIX: u32 = 24;
 const MODEL_OPACITY: u32 = 27;
 
 impl GaussianOptions<'_> {
-    /// Draws scenes of `degree` in the default state, replacing what a 32-bit float target holds, untested.
+    /// Options for scenes of `degree` in the default state, which replace the contents of a 32-bit float target,
+    /// without tests.
     pub fn new(degree: u32) -> Self {
         Self {
             state: PipelineGaussianStateCreateInfoGAURAST::default(),
@@ -162,7 +163,7 @@ impl GaussianOptions<'_> {
         }
     }
 
-    /// Draws scenes of `degree` in the default state over what a target holds, untested.
+    /// Options for scenes of `degree` in the default state, which blend over the contents of a target, without tests.
     pub fn over(degree: u32, target: &impl Attachments) -> Self {
         Self {
             formats: target.attachment_formats(),
@@ -172,7 +173,7 @@ impl GaussianOptions<'_> {
     }
 }
 
-/// (C, 1 - T) over what the attachment holds.
+/// Blending of (C, 1 - T) over the attachment's contents.
 pub fn over() -> vk::PipelineColorBlendAttachmentState {
     use vk::BlendFactor as Factor;
     opaque()
@@ -187,7 +188,7 @@ pub fn over() -> vk::PipelineColorBlendAttachmentState {
 pub struct GaussianPipeline(Pipeline);
 
 impl GaussianPipeline {
-    /// Creates it.
+    /// Creates the pipeline.
     ///
     /// # Panics
     /// If the driver refuses it.
@@ -277,7 +278,7 @@ fn all_attributes(options: &GaussianOptions<'_>) -> Vec<vk::VertexInputAttribute
     attributes
 }
 
-/// Where those attributes are.
+/// The attribute locations of a Gaussian.
 pub fn attribute_locations() -> GaussianAttributeLocationsGAURAST {
     GaussianAttributeLocationsGAURAST::default()
         .position(0)
@@ -287,7 +288,7 @@ pub fn attribute_locations() -> GaussianAttributeLocationsGAURAST {
         .first_spherical_harmonics(4)
 }
 
-/// A scene's bindings: positions, scales, rotations, opacities, coefficients.
+/// The bindings of a scene: positions, scales, rotations, opacities, coefficients.
 pub fn scene_bindings(
     degree: u32,
     looks_by_instance: bool,
@@ -308,7 +309,7 @@ pub fn scene_bindings(
     })
 }
 
-/// The attributes in those bindings, up to a degree.
+/// The attributes in those bindings, with coefficients up to a degree.
 pub fn attributes(degree: u32) -> Vec<vk::VertexInputAttributeDescription> {
     let attribute = |location: u32, binding, format, offset| vk::VertexInputAttributeDescription {
         location,

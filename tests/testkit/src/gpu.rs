@@ -16,7 +16,7 @@ use crate::settings::{Settings, with_settings};
 
 pub use crate::open::{Driver, OpenError, Opening};
 
-/// A device with one queue and all features that it has. Cheap to clone; the last one destroys it.
+/// A device with one queue and all its features. Cloning is cheap; dropping the last clone destroys the device.
 #[derive(Clone)]
 pub struct Gpu(Arc<Shared>);
 
@@ -32,7 +32,7 @@ impl fmt::Debug for Gpu {
 }
 
 impl Gpu {
-    /// This driver, linked into the process.
+    /// Opens this driver, linked into the process.
     ///
     /// # Errors
     /// [`OpenError`] names the step that failed.
@@ -40,7 +40,8 @@ impl Gpu {
         with_settings(settings, || Self::open(&Opening::of(Driver::Embedded)))
     }
 
-    /// This driver, linked into the process, with extensions and features of theirs beside those of the core version.
+    /// Opens this driver, linked into the process, with extensions and their features in addition to those of the core
+    /// version.
     ///
     /// # Errors
     /// [`OpenError`] names the step that failed.
@@ -57,29 +58,29 @@ impl Gpu {
         })
     }
 
-    /// This driver, through the loader. The process must have been started with its manifest in
+    /// Opens this driver through the loader. The process must have been started with the driver's manifest in
     /// `VK_DRIVER_FILES`.
     ///
     /// # Errors
-    /// [`OpenError`], for example where there is no loader.
+    /// [`OpenError`], for example if there is no loader.
     pub fn loaded() -> Result<Self, OpenError> {
         with_settings(&Settings::default(), || {
             Self::open(&Opening::of(Driver::Loaded))
         })
     }
 
-    /// lavapipe, through the loader, sampling textures as accurately as it can if the process asks
-    /// it to (see [`accurate_lavapipe`](crate::loader::accurate_lavapipe)).
+    /// Opens lavapipe through the loader. It samples textures as accurately as it can if the process requests that (see
+    /// [`accurate_lavapipe`](crate::loader::accurate_lavapipe)).
     ///
     /// # Errors
-    /// [`OpenError`], for example where there is no loader, or it does not know lavapipe.
+    /// [`OpenError`], for example if there is no loader, or it does not find lavapipe.
     pub fn lavapipe() -> Result<Self, OpenError> {
         with_settings(&Settings::default(), || {
             Self::open(&Opening::of(Driver::Lavapipe))
         })
     }
 
-    /// A driver's device, with what `opening` says.
+    /// Opens a driver's device with the options in `opening`.
     ///
     /// # Errors
     /// [`OpenError`] names the step that failed.
@@ -104,7 +105,7 @@ impl Gpu {
         &self.0.opened.name
     }
 
-    /// The entry, to load extensions by.
+    /// The entry, for loading extensions.
     pub fn entry(&self) -> &ash::Entry {
         &self.0.opened.entry
     }
@@ -139,18 +140,18 @@ impl Gpu {
         self.0.opened.gaussian.as_ref()
     }
 
-    /// The warnings and errors heard since the last call.
+    /// The warnings and errors reported since the last call.
     pub fn messages(&self) -> Vec<Message> {
         self.0.opened.messages.take()
     }
 
-    /// The texts of the warnings and errors heard since the last call.
+    /// The texts of the warnings and errors reported since the last call.
     pub fn message_texts(&self) -> Vec<String> {
         let messages = self.messages().into_iter();
         messages.map(|message| message.text).collect()
     }
 
-    /// What a format can be used for.
+    /// The properties of a format.
     pub fn format_properties(&self, format: vk::Format) -> vk::FormatProperties {
         // SAFETY: the physical device is the instance's.
         unsafe {
@@ -159,7 +160,7 @@ impl Gpu {
         }
     }
 
-    /// What images of `format` with optimal tiling can be used for.
+    /// The features of `format` for images with optimal tiling.
     pub fn format_features(&self, format: vk::Format) -> vk::FormatFeatureFlags {
         self.format_properties(format).optimal_tiling_features
     }
@@ -178,12 +179,12 @@ impl Gpu {
             .expect("a memory type that fits")
     }
 
-    /// Records commands, submits them and waits for their end.
+    /// Records commands, submits them and waits for their completion.
     pub fn run(&self, record: impl FnOnce(&Commands)) {
         self.record(record).submit();
     }
 
-    /// Records commands that can be submitted any number of times. What they use must outlive them.
+    /// Records commands that can be submitted any number of times. The objects that they use must outlive them.
     pub fn record(&self, record: impl FnOnce(&Commands)) -> Recorded {
         self.try_record(record).expect("it ends")
     }
@@ -191,7 +192,7 @@ impl Gpu {
     /// Records commands that can be submitted any number of times.
     ///
     /// # Errors
-    /// What their end gives: a command was wrong.
+    /// The error of ending the command buffer, if a command was wrong.
     pub fn try_record(&self, record: impl FnOnce(&Commands)) -> Result<Recorded, vk::Result> {
         let primary = vk::CommandBufferLevel::PRIMARY;
         self.record_as(primary, &vk::CommandBufferBeginInfo::default(), record)
@@ -213,7 +214,7 @@ impl Gpu {
     /// Records a command buffer.
     ///
     /// # Errors
-    /// What its end gives: a command was wrong.
+    /// The error of ending the command buffer, if a command was wrong.
     pub fn record_as(
         &self,
         level: vk::CommandBufferLevel,
@@ -228,7 +229,7 @@ impl Gpu {
         Ok(recorded)
     }
 
-    /// The queue. Threads that submit to it must wait for each other.
+    /// The queue. Threads must not submit to it at the same time.
     pub fn queue(&self) -> vk::Queue {
         self.0.opened.queue
     }
@@ -265,12 +266,12 @@ impl Commands {
         self.gpu.device()
     }
 
-    /// The device's functions, and the command buffer, for commands that have no method here.
+    /// The device's functions and the command buffer, for commands that have no method here.
     pub fn raw(&self) -> (&ash::Device, vk::CommandBuffer) {
         (self.gpu.device(), self.raw)
     }
 
-    /// Everything after waits for everything before.
+    /// Records a barrier: all later commands wait for all earlier ones.
     pub fn barrier(&self) {
         self.barriers(&[]);
     }
@@ -288,7 +289,7 @@ impl Commands {
         }
     }
 
-    /// Gives the aspects of an image its first layout.
+    /// Records the transition of an image's aspects from the undefined layout to `GENERAL`.
     pub(crate) fn become_general(&self, image: vk::Image, range: vk::ImageSubresourceRange) {
         let ignored = vk::QUEUE_FAMILY_IGNORED;
         self.barriers(&[vk::ImageMemoryBarrier::default()
@@ -333,7 +334,7 @@ impl Commands {
         self.barrier();
     }
 
-    /// A pass over `target`, with viewport and scissor set to all of it.
+    /// Records a pass over `target`, with viewport and scissor set to all of it.
     pub fn pass(&self, target: &impl Attachments, pass: &Pass, draws: impl FnOnce()) {
         self.barrier();
         target.begin(self.device(), self.raw, pass);
@@ -352,7 +353,7 @@ impl Commands {
         self.scissor([0, 0], [width, height]);
     }
 
-    /// Sets the viewport to x, y, width and height, and its range of depths.
+    /// Sets the viewport to x, y, width and height, and its depth range.
     pub fn viewport(&self, [x, y, width, height]: [f32; 4], [min_depth, max_depth]: [f32; 2]) {
         let viewport = vk::Viewport {
             x,
@@ -397,7 +398,7 @@ impl Commands {
         }
     }
 
-    /// Binds a descriptor set to the graphics pipeline bound last.
+    /// Binds a descriptor set for the graphics pipeline that was bound last.
     pub fn bind_set(&self, set: impl Into<vk::DescriptorSet>, dynamic_offsets: &[u32]) {
         let (point, sets) = (vk::PipelineBindPoint::GRAPHICS, [set.into()]);
         // SAFETY: see the crate.
@@ -472,7 +473,7 @@ impl Commands {
         unsafe { gaussian.cmd_end_gaussian_set(self.raw) };
     }
 
-    /// Draws `vertices`, once.
+    /// Draws `vertices` as one instance.
     pub fn draw(&self, vertices: std::ops::Range<u32>) {
         self.draw_instances(vertices, 0..1);
     }
@@ -488,7 +489,7 @@ impl Commands {
         }
     }
 
-    /// Draws indexed vertices, once.
+    /// Draws indexed vertices as one instance.
     pub fn draw_indexed(&self, indices: std::ops::Range<u32>, vertex_offset: i32) {
         let (count, first) = (indices.end - indices.start, indices.start);
         // SAFETY: see the crate.
@@ -498,7 +499,7 @@ impl Commands {
         }
     }
 
-    /// Draws `count` times by parameters in a buffer, 16 bytes apart.
+    /// Records `count` indirect draws, whose parameters are in a buffer, 16 bytes apart.
     pub fn draw_indirect(&self, draws: impl Into<vk::Buffer>, count: u32) {
         let draws = draws.into();
         // SAFETY: see the crate.
@@ -509,7 +510,7 @@ impl Commands {
     }
 }
 
-/// A command buffer that is ready.
+/// A recorded command buffer.
 #[derive(Debug)]
 pub struct Recorded {
     gpu: Gpu,
@@ -545,15 +546,15 @@ impl Recorded {
         unsafe { self.gpu.device().begin_command_buffer(self.raw, info) }.expect("it begins");
     }
 
-    /// Submits it and waits for its end.
+    /// Submits it and waits for its completion.
     pub fn submit(&self) {
         self.try_submit().expect("it finishes");
     }
 
-    /// Submits it and waits for its end.
+    /// Submits it and waits for its completion.
     ///
     /// # Errors
-    /// For example that the device is lost.
+    /// The error of the submission or of waiting, for example that the device is lost.
     pub fn try_submit(&self) -> Result<(), vk::Result> {
         let buffers = [self.raw];
         let submits = [vk::SubmitInfo::default().command_buffers(&buffers)];

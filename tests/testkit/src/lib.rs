@@ -1,20 +1,19 @@
-//! The Vulkan application that all tests are.
+//! A Vulkan application for tests: devices of any driver, resources, pipelines and pictures.
 //!
-//! | module | has |
+//! | module | contents |
 //! |---|---|
-//! | [`gpu`] | devices of this driver, linked or loaded, and of lavapipe: at a SIMD level, with a number of threads; recording and submission |
+//! | [`gpu`] | devices of this driver and of lavapipe, with a SIMD level and a thread count; recording, submission |
 //! | [`resource`] | buffers, images with upload and readback, samplers |
 //! | [`descriptors`] | descriptor sets |
 //! | [`pipeline`] | graphics pipelines, of triangles and of Gaussians, and compute pipelines |
-//! | [`pass`] | how passes begin and end |
-//! | [`target`] | attachments, and [pictures](output) of all that they hold |
+//! | [`pass`] | render passes, with render pass objects or dynamic rendering |
+//! | [`target`] | attachments, and [pictures](output) of their contents |
 //! | [`gaussians`] | Gaussians in vertex buffers, and pipelines that draw them |
-//! | [`difference`] | how the pictures of two devices differ |
+//! | [`difference`] | comparison of the pictures of two devices |
 //!
-//! `unsafe` has one reason throughout: these are Vulkan calls on objects of one [`Gpu`], which every resource keeps
-//! alive, and every submission is waited for before a resource can go. What tests record stays within Vulkan's valid
-//! usage (`VK_INSTANCE_LAYERS=VK_LAYER_KHRONOS_validation` shows where it doesn't), unless a test is about what becomes
-//! of it otherwise.
+//! The reason for all `unsafe` is the same. These are Vulkan calls on objects of one [`Gpu`], which every resource
+//! keeps alive, and every submission is waited for before a resource is destroyed. Tests record only valid usage of
+//! Vulkan, except tests of invalid usage. `VK_INSTANCE_LAYERS=VK_LAYER_KHRONOS_validation` reports violations.
 
 pub mod descriptors;
 pub mod difference;

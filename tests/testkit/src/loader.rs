@@ -1,16 +1,16 @@
-//! Drivers as the Vulkan loader finds them, by manifests in the environment.
+//! Drivers that the Vulkan loader finds, by manifests in the environment.
 
 use std::path::{Path, PathBuf};
 
 use ash::vk::TaggedStructure;
 use gaurast_runner::Case;
 
-/// Builds this driver's shared library, and writes its manifest to `folder`; returns the manifest's path.
+/// Writes a manifest of this driver's shared library to `folder`, and returns its path.
 ///
-/// It is the project's manifest but for the library's path.
+/// It is the project's manifest with another library path.
 ///
 /// # Panics
-/// If the library isn't built, or the folder can't be written.
+/// If the library is not built, or the folder cannot be written.
 pub fn manifest(folder: &Path) -> PathBuf {
     let library = gaurast_runner::built_library("vulkan_gaurast-icd", "libvulkan_gaurast.so");
     let library = library.to_str().expect("a path of Unicode");
@@ -22,10 +22,10 @@ pub fn manifest(folder: &Path) -> PathBuf {
     path
 }
 
-/// Runs `inside` in a process of its own, where the loader finds this driver alone. The test needs the loader.
+/// Runs `inside` in a process of its own, in which the loader finds only this driver. The test needs the loader.
 ///
 /// # Panics
-/// If it fails there.
+/// If `inside` fails.
 pub fn through_the_loader(case: &Case, inside: impl FnOnce()) {
     if case.is_alone() {
         return inside();
@@ -41,8 +41,8 @@ pub fn through_the_loader(case: &Case, inside: impl FnOnce()) {
     });
 }
 
-/// The extension's structures as the validation layer wants to be told of them in the environment: pairs of type and
-/// size, all of them separated by colons.
+/// The extension's structures in the form of the validation layer's environment variable: pairs of structure type and
+/// size, all separated by colons.
 fn unregistered_structures() -> String {
     use gaurast::vk::{
         GaussianCameraGAURAST as Camera,
@@ -66,12 +66,12 @@ fn unregistered_structures() -> String {
     .join(separator)
 }
 
-/// Has lavapipe sample textures as accurately as it can: per pixel, and in floats. Has an effect
-/// only before lavapipe's first device of the process.
+/// Makes lavapipe sample textures as accurately as it can: per pixel, and in floats. This has an effect only before the
+/// process creates its first lavapipe device.
 ///
 /// # Safety
-/// No other thread may read the environment meanwhile, other than through the standard library.
+/// No other thread may read the environment at the same time, except through the standard library.
 pub unsafe fn accurate_lavapipe() {
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller guarantees it.
     unsafe { std::env::set_var("GALLIVM_PERF", "no_aos_sampling,no_quad_lod") };
 }

@@ -1,11 +1,11 @@
-//! Messages of a driver and of layers, as a debug messenger hears them.
+//! Messages of a driver and of layers, received by a debug messenger.
 
 use std::ffi::{CStr, c_void};
 use std::sync::{Mutex, PoisonError};
 
 use ash::vk;
 
-/// A message that a debug messenger heard.
+/// A message that a debug messenger received.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Message {
     /// The message's id name, such as a VUID.
@@ -14,18 +14,18 @@ pub struct Message {
     pub text: String,
 }
 
-/// Messages that were heard since the last look.
+/// Messages that were received and not taken yet.
 #[derive(Debug, Default)]
 pub struct Messages(Mutex<Vec<Message>>);
 
 impl Messages {
-    /// Creation info of a messenger that keeps warnings and errors here.
+    /// Creation info of a messenger that stores warnings and errors here.
     pub fn messenger(&self) -> vk::DebugUtilsMessengerCreateInfoEXT<'_> {
         use vk::DebugUtilsMessageSeverityFlagsEXT as Severity;
         self.messenger_of(Severity::WARNING | Severity::ERROR)
     }
 
-    /// Creation info of a messenger that keeps messages of these severities here.
+    /// Creation info of a messenger that stores messages of these severities here.
     pub fn messenger_of(
         &self,
         severities: vk::DebugUtilsMessageSeverityFlagsEXT,
@@ -38,7 +38,7 @@ impl Messages {
             .user_data(std::ptr::from_ref(self).cast_mut().cast())
     }
 
-    /// Takes the messages heard since the last call.
+    /// Takes the messages received since the last call.
     pub fn take(&self) -> Vec<Message> {
         std::mem::take(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
     }

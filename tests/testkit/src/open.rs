@@ -8,7 +8,7 @@ use gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST as Gauss
 
 use crate::messages::Messages;
 
-/// A driver that tests draw by.
+/// A driver that tests use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Driver {
     /// This driver, linked into the process.
@@ -46,25 +46,25 @@ impl Driver {
     }
 }
 
-/// What a device is opened with, beside the features of the core versions that it has.
+/// The options for opening a device. All supported features of the core versions are enabled in any case.
 #[derive(Clone, Copy, Debug)]
 pub struct Opening<'a> {
     /// The driver.
     pub driver: Driver,
     /// Layers of the instance.
     pub layers: &'a [&'a CStr],
-    /// Extensions of the device, beside Gaussian draws.
+    /// Extensions of the device, in addition to Gaussian draws.
     pub extensions: &'a [&'a CStr],
-    /// [`EXTENSIONS`] too, with all that the device has of their features.
+    /// True to enable [`EXTENSIONS`] too, with all their supported features.
     pub all_extensions: bool,
-    /// Features of Gaussian draws; all that the device has by default.
+    /// Features of Gaussian draws, or `None` for all that the device supports.
     pub gaussian: Option<GaussianFeatures<'static>>,
-    /// Access beyond a resource's end is robust. It costs time.
+    /// True to make access beyond a resource's end robust. It costs time.
     pub robust: bool,
 }
 
 impl Opening<'_> {
-    /// What a driver's device is opened with by default: Gaussian draws if it has them, and no robust access.
+    /// The default options for a driver: Gaussian draws if it has them, and no robust access.
     pub const fn of(driver: Driver) -> Self {
         Self {
             driver,
@@ -77,7 +77,7 @@ impl Opening<'_> {
     }
 }
 
-/// Extensions that this driver has and tests are about.
+/// Extensions of this driver that tests use.
 pub const EXTENSIONS: [&CStr; 6] = [
     ash::khr::map_memory2::NAME,
     ash::khr::performance_query::NAME,
@@ -87,13 +87,13 @@ pub const EXTENSIONS: [&CStr; 6] = [
     ash::ext::vertex_attribute_divisor::NAME,
 ];
 
-/// Why there is no device.
+/// The reason for which no device was opened.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum OpenError {
-    /// There is no loader here.
+    /// The Vulkan loader is missing.
     #[error("there is no Vulkan loader here: {0}")]
     NoLoader(String),
-    /// The loader knows no such device.
+    /// The loader finds no such device.
     #[error("the Vulkan loader does not know {0}")]
     NoDevice(&'static str),
     /// Vulkan refused a step.
@@ -105,7 +105,7 @@ pub(crate) fn refused(what: &'static str) -> impl Fn(vk::Result) -> OpenError {
     move |result| OpenError::Refused(what, result)
 }
 
-/// An instance, its device, and what is known about them. Destroyed when dropped.
+/// An instance and its device with their properties. Dropping it destroys them.
 pub(crate) struct Opened {
     pub(crate) name: String,
     pub(crate) queue: vk::Queue,
@@ -119,12 +119,12 @@ pub(crate) struct Opened {
     pub(crate) messages: Box<Messages>,
     messenger: vk::DebugUtilsMessengerEXT,
     debug_utils: ash::ext::debug_utils::Instance,
-    /// Last: it may own the library that all others call.
+    /// Dropped last, because it may own the library of all functions above.
     pub(crate) entry: ash::Entry,
 }
 
 impl Opened {
-    /// Opens a device, by `entry` if it is given, with `features` of extensions.
+    /// Opens a device. It uses `entry` if given, and enables `features` of extensions.
     pub(crate) fn new<T: vk::ExtendsDeviceCreateInfo>(
         entry: Option<ash::Entry>,
         opening: &Opening<'_>,
@@ -142,8 +142,8 @@ impl Opened {
             .enabled_layer_names(&layers)
             .enabled_extension_names(&extensions)
             .push_next(&mut messenger_info);
-        // SAFETY: the create infos are valid, what is created lives as long as the instance, and the messages outlive the
-        // messenger that writes to them.
+        // SAFETY: the create infos are valid, what is created lives as long as the instance, and the messages outlive
+        // the messenger that writes to them.
         unsafe {
             let instance = entry
                 .create_instance(&info, None)
@@ -201,7 +201,7 @@ impl Drop for Opened {
     }
 }
 
-/// The first device whose driver is wanted, with its name and version.
+/// The first device of the requested driver, with its name and version.
 fn find(
     instance: &ash::Instance,
     is_wanted: impl Fn(vk::DriverId) -> bool,
@@ -223,7 +223,7 @@ fn find(
     Ok(None)
 }
 
-/// Reports whether a device draws Gaussians.
+/// Returns true if a device draws Gaussians.
 pub(crate) fn has_gaussians(instance: &ash::Instance, physical_device: vk::PhysicalDevice) -> bool {
     // SAFETY: the physical device is the instance's.
     let extensions = unsafe { instance.enumerate_device_extension_properties(physical_device) };
@@ -233,8 +233,8 @@ pub(crate) fn has_gaussians(instance: &ash::Instance, physical_device: vk::Physi
     extensions.is_ok_and(|extensions| extensions.iter().any(is_it))
 }
 
-/// Creates a device with every core feature that it has, with features of Gaussian draws if it has those, and with
-/// extensions and their features.
+/// Creates a device with every core feature that it supports, features of Gaussian draws if it has them, and extensions
+/// with their features.
 fn create_device<T: vk::ExtendsDeviceCreateInfo>(
     instance: &ash::Instance,
     physical_device: vk::PhysicalDevice,
@@ -278,7 +278,7 @@ fn create_device<T: vk::ExtendsDeviceCreateInfo>(
     unsafe {
         instance.get_physical_device_features2(physical_device, &mut features);
         let mut core = features.features;
-        // They are in a chain already.
+        // This structure is already part of a chain.
         vulkan_1_1.p_next = std::ptr::null_mut();
         vulkan_1_2.p_next = std::ptr::null_mut();
         vulkan_1_3.p_next = std::ptr::null_mut();

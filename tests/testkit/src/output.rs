@@ -1,4 +1,4 @@
-//! What a scene leaves behind.
+//! The pictures that a scene draws.
 
 use ash::vk;
 
@@ -7,7 +7,7 @@ use crate::resource::texel_size;
 /// The images that a scene draws, in the order in which it made them.
 #[derive(Clone, Debug, Default)]
 pub struct Output {
-    /// Those images.
+    /// The pictures, in the order in which they were made.
     pub pictures: Vec<Picture>,
 }
 
@@ -21,7 +21,7 @@ impl Output {
             }));
     }
 
-    /// Whether some picture shows anything: not all of its texels are alike.
+    /// True if some picture shows anything: its texels are not all equal.
     pub fn shows_something(&self) -> bool {
         self.pictures.iter().any(|picture| {
             let texel = texel_size(picture.format) as usize;
@@ -37,7 +37,7 @@ impl Output {
 /// One image: an attachment, or one sample of it.
 #[derive(Clone, Debug)]
 pub struct Picture {
-    /// Which one it is.
+    /// The picture's name.
     pub name: String,
     /// Its format.
     pub format: vk::Format,
@@ -48,10 +48,10 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// Its texels as values of `T`, which must have their size.
+    /// The texels as values of `T`, which must have the size of a texel.
     ///
     /// # Panics
-    /// If it hasn't.
+    /// If the sizes differ.
     pub fn texels<T: bytemuck::Pod>(&self) -> Vec<T> {
         assert_eq!(size_of::<T>(), texel_size(self.format) as usize);
         bytemuck::pod_collect_to_vec(&self.bytes)

@@ -1,21 +1,21 @@
-//! Passes: how they begin and end, and what commands are told of targets and pipelines.
+//! Passes: their beginning and end, and the traits of targets and pipelines that commands use.
 
 use ash::vk;
 
-/// How a pass begins and ends.
+/// The options of a pass: load and store operations, clear values, area and flags.
 #[derive(Clone, Copy)]
 pub struct Pass {
-    /// What all colour attachments are cleared to.
+    /// The clear value of all colour attachments.
     pub color: vk::ClearColorValue,
-    /// What depth and stencil are cleared to.
+    /// The clear value of depth and stencil.
     pub depth: vk::ClearDepthStencilValue,
-    /// What becomes of the attachments' contents at the beginning.
+    /// The load operation of all attachments.
     pub load: vk::AttachmentLoadOp,
-    /// What becomes of them at the end.
+    /// The store operation of all attachments.
     pub store: vk::AttachmentStoreOp,
-    /// The area drawn to; everything by default.
+    /// The render area; the whole target by default.
     pub area: Option<vk::Rect2D>,
-    /// Whether draws come from secondary command buffers.
+    /// The rendering flags, for example for draws in secondary command buffers.
     pub flags: vk::RenderingFlags,
 }
 
@@ -54,7 +54,7 @@ impl Pass {
         }
     }
 
-    /// A pass that goes on with what is there.
+    /// A pass that loads the attachments' contents.
     pub fn load() -> Self {
         Self {
             load: vk::AttachmentLoadOp::LOAD,
@@ -63,19 +63,19 @@ impl Pass {
     }
 }
 
-/// Formats of attachments, and their samples.
+/// Formats and sample count of attachments.
 #[derive(Clone, Debug)]
 pub struct Formats {
-    /// Of colour.
+    /// Formats of the colour attachments.
     pub colors: Vec<vk::Format>,
-    /// Of depth, stencil or both; undefined if there is none.
+    /// Format of depth, stencil or both; undefined if there is none.
     pub depth: vk::Format,
-    /// Samples of a pixel.
+    /// Number of samples per pixel.
     pub samples: u32,
 }
 
 impl Formats {
-    /// One colour attachment of one sample.
+    /// The formats of one colour attachment with one sample.
     pub fn of(color: vk::Format) -> Self {
         Self {
             colors: vec![color],
@@ -85,7 +85,7 @@ impl Formats {
     }
 }
 
-/// What passes draw to.
+/// A set of attachments to which passes draw.
 pub trait Attachments {
     /// Width and height in pixels.
     fn size(&self) -> [u32; 2];
@@ -103,8 +103,8 @@ pub trait Attachments {
     }
 }
 
-/// What is bound as a pipeline.
+/// An object that is bound as a graphics pipeline.
 pub trait Bindable {
-    /// The pipeline, and the layout by which descriptor sets and push constants reach it.
+    /// The pipeline, and its layout for descriptor sets and push constants.
     fn handles(&self) -> (vk::Pipeline, vk::PipelineLayout);
 }

@@ -1,4 +1,4 @@
-//! Pipelines: of graphics, all defaults with what a test changes, and of compute.
+//! Graphics pipelines, made of defaults and a test's changes, and compute pipelines.
 
 use ash::vk;
 use gaurast::vk::{
@@ -18,7 +18,7 @@ pub struct Shader {
     pub stage: vk::ShaderStageFlags,
     /// Its SPIR-V.
     pub words: Vec<u32>,
-    /// Bits of specialization constants, by number.
+    /// Specialization constants: number and bits.
     pub constants: Vec<(u32, u32)>,
 }
 
@@ -43,37 +43,37 @@ impl Shader {
     }
 }
 
-/// Everything that a graphics pipeline is made of. The defaults draw a list of triangles without shaders, both sides, to
-/// one attachment of four 32-bit floats, without tests or blending.
+/// All state of a graphics pipeline. The defaults draw a list of triangles without shaders, both faces, to one
+/// attachment of four 32-bit floats, without tests or blending.
 #[derive(Clone)]
 pub struct Graphics<'a> {
-    /// Shaders, a stage each.
+    /// Shaders, one per stage.
     pub shaders: Vec<Shader>,
     /// Layouts of descriptor sets.
     pub set_layouts: Vec<vk::DescriptorSetLayout>,
     /// Push constants.
     pub push: Vec<vk::PushConstantRange>,
-    /// Whether creation is told of a layout at all.
+    /// True if creation gets a pipeline layout.
     pub has_layout: bool,
-    /// Where vertices come from.
+    /// The vertex bindings.
     pub bindings: Vec<vk::VertexInputBindingDescription>,
-    /// How many instances take the same vertex.
+    /// The instance divisors of vertex bindings.
     pub divisors: Vec<vk::VertexInputBindingDivisorDescriptionKHR>,
-    /// What vertices are made of.
+    /// The vertex attributes.
     pub attributes: Vec<vk::VertexInputAttributeDescription>,
-    /// What they become.
+    /// The primitive topology.
     pub topology: vk::PrimitiveTopology,
-    /// Whether an index of all ones begins a new primitive.
+    /// True if an index of all ones begins a new primitive.
     pub restart: bool,
-    /// Viewports and scissors.
+    /// Number of viewports and of scissors.
     pub viewports: u32,
-    /// Whether the last vertex of a primitive has what is flat.
+    /// True if the last vertex of a primitive is the provoking one.
     pub provoking_last: bool,
     /// Rasterization.
     pub raster: vk::PipelineRasterizationStateCreateInfo<'static>,
-    /// Samples and how they are shaded.
+    /// Sample count and sample shading.
     pub multisample: vk::PipelineMultisampleStateCreateInfo<'static>,
-    /// Which samples are written, if not all.
+    /// The samples that are written, or `None` for all.
     pub sample_mask: Option<u32>,
     /// Depth and stencil tests.
     pub depth_stencil: vk::PipelineDepthStencilStateCreateInfo<'static>,
@@ -85,17 +85,17 @@ pub struct Graphics<'a> {
     pub blend_constants: [f32; 4],
     /// Dynamic states.
     pub dynamic: Vec<vk::DynamicState>,
-    /// Formats of colour attachments, in a dynamic render.
+    /// Formats of colour attachments, for dynamic rendering.
     pub formats: Vec<vk::Format>,
-    /// The format of depth, stencil or both, in a dynamic render.
+    /// The format of depth, stencil or both, for dynamic rendering.
     pub depth_format: vk::Format,
-    /// The views of a dynamic render, a bit each.
+    /// The views of dynamic rendering, one bit each.
     pub view_mask: u32,
-    /// A render pass object and subpass instead of dynamic rendering.
+    /// A render pass object and subpass, in place of dynamic rendering.
     pub subpass: Option<(vk::RenderPass, u32)>,
     /// The state of Gaussian draws.
     pub gaussian: Option<PipelineGaussianStateCreateInfoGAURAST<'a>>,
-    /// What Gaussian draws may leave out.
+    /// The approximations that Gaussian draws may use.
     pub approximation: Option<PipelineGaussianApproximationStateCreateInfoGAURAST<'static>>,
 }
 
@@ -133,7 +133,7 @@ impl Default for Graphics<'_> {
 }
 
 impl Graphics<'_> {
-    /// The same with another shader of its stage.
+    /// The same with another shader, which replaces that of its stage.
     #[must_use]
     pub fn with_shader(mut self, shader: Shader) -> Self {
         self.shaders.retain(|other| other.stage != shader.stage);
@@ -141,17 +141,17 @@ impl Graphics<'_> {
         self
     }
 
-    /// The same with a state more dynamic.
+    /// The same with one more dynamic state.
     #[must_use]
     pub fn with_dynamic(mut self, state: vk::DynamicState) -> Self {
         self.dynamic.push(state);
         self
     }
 
-    /// Creates it.
+    /// Creates the pipeline.
     ///
     /// # Errors
-    /// What the driver answers.
+    /// The driver's result.
     ///
     /// # Panics
     /// If a shader module is refused, or the driver gives a pipeline that it refused.
@@ -267,7 +267,7 @@ impl Graphics<'_> {
     }
 }
 
-/// The pipeline that was created, or the result; a pipeline that is refused is null.
+/// The only pipeline that was created, or the error. A refused pipeline must be null.
 fn one(
     created: Result<Vec<vk::Pipeline>, (Vec<vk::Pipeline>, vk::Result)>,
 ) -> Result<vk::Pipeline, vk::Result> {
@@ -280,72 +280,72 @@ fn one(
     }
 }
 
-/// Passes on position and colour.
+/// A vertex shader that passes on position and colour.
 pub const VERTEX: &str = "
     layout(location = 0) in vec4 position;
     layout(location = 1) in vec4 color;
     layout(location = 0) out vec4 v_color;
     void main() { gl_Position = position; gl_PointSize = 1.0; v_color = color; }";
 
-/// Writes the interpolated colour.
+/// A fragment shader that writes the interpolated colour.
 pub const FRAGMENT: &str = "
     layout(location = 0) in vec4 v_color;
     layout(location = 0) out vec4 color;
     void main() { color = v_color; }";
 
-/// What scenes draw by default.
+/// The default vertex of scenes.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Vertex {
-    /// In clip coordinates.
+    /// The position in clip coordinates.
     pub position: [f32; 4],
     /// Red, green, blue and alpha.
     pub color: [f32; 4],
 }
 
-/// What a pipeline is made of. The defaults draw a list of [`Vertex`] triangles, both sides, without
-/// depth test or blending.
+/// The options of a pipeline. The defaults draw a list of [`Vertex`] triangles, both faces, without depth test or
+/// blending.
 #[derive(Clone)]
 pub struct PipelineOptions<'a> {
-    /// GLSL.
+    /// The vertex shader in GLSL.
     pub vertex: &'a str,
-    /// GLSL; without it there is no fragment stage.
+    /// The fragment shader in GLSL, or `None` for no fragment stage.
     pub fragment: Option<&'a str>,
     /// Specialization constants of both stages.
     pub specialization: Vec<(u32, u32)>,
-    /// Where vertices come from.
+    /// The vertex bindings.
     pub vertex_bindings: Vec<vk::VertexInputBindingDescription>,
-    /// What they are made of.
+    /// The vertex attributes.
     pub vertex_attributes: Vec<vk::VertexInputAttributeDescription>,
-    /// What they become.
+    /// The primitive topology.
     pub topology: vk::PrimitiveTopology,
-    /// Whether an index of all ones begins a new primitive.
+    /// True if an index of all ones begins a new primitive.
     pub restart: bool,
     /// Rasterization.
     pub raster: vk::PipelineRasterizationStateCreateInfo<'static>,
-    /// The least share of samples that are shaded one by one.
+    /// The minimum share of samples that are shaded separately, or `None` without sample shading.
     pub sample_shading: Option<f32>,
-    /// Which samples are written.
+    /// The samples that are written.
     pub sample_mask: u32,
-    /// Whether alpha decides which samples are covered.
+    /// True if alpha determines the covered samples.
     pub alpha_to_coverage: bool,
-    /// Whether alpha is replaced by one.
+    /// True if alpha is replaced by one.
     pub alpha_to_one: bool,
     /// Depth and stencil tests.
     pub depth_stencil: vk::PipelineDepthStencilStateCreateInfo<'static>,
-    /// Blending of each colour attachment; those beyond write all components unblended.
+    /// Blending of each colour attachment; further attachments write all components unblended.
     pub blend: Vec<vk::PipelineColorBlendAttachmentState>,
     /// Constants for blending.
     pub blend_constants: [f32; 4],
     /// A logic operation instead of blending.
     pub logic_op: Option<vk::LogicOp>,
-    /// Dynamic states beside viewport and scissor.
+    /// Dynamic states in addition to viewport and scissor.
     pub dynamic: Vec<vk::DynamicState>,
     /// The descriptor set.
     pub bindings: Option<&'a Bindings>,
-    /// A render pass object and subpass instead of dynamic rendering.
+    /// A render pass object and subpass, in place of dynamic rendering.
     pub subpass: Option<(vk::RenderPass, u32)>,
-    /// The views of a dynamic render, a bit each.
+    /// The views of dynamic rendering, one bit each.
     pub view_mask: u32,
 }
 
@@ -402,7 +402,7 @@ pub fn attribute(
     }
 }
 
-/// Test and write depth.
+/// The state that tests and writes depth.
 pub fn depth_test(op: vk::CompareOp) -> vk::PipelineDepthStencilStateCreateInfo<'static> {
     vk::PipelineDepthStencilStateCreateInfo::default()
         .depth_test_enable(true)
@@ -411,12 +411,12 @@ pub fn depth_test(op: vk::CompareOp) -> vk::PipelineDepthStencilStateCreateInfo<
         .max_depth_bounds(1.0)
 }
 
-/// Write all components without blending.
+/// The state that writes all components without blending.
 pub fn opaque() -> vk::PipelineColorBlendAttachmentState {
     vk::PipelineColorBlendAttachmentState::default().color_write_mask(vk::ColorComponentFlags::RGBA)
 }
 
-/// Blend colour and alpha alike.
+/// The state that blends colour and alpha in the same way.
 pub fn blend(
     from: vk::BlendFactor,
     to: vk::BlendFactor,
@@ -536,10 +536,10 @@ impl Kernel {
         created.unwrap_or_else(|error| panic!("{error:?}: {:?}", gpu.messages()))
     }
 
-    /// Creates a pipeline with bits of specialization constants, by number.
+    /// Creates a pipeline with specialization constants: number and bits.
     ///
     /// # Errors
-    /// What the driver answers.
+    /// The driver's result.
     pub fn specialized(
         gpu: &Gpu,
         words: &[u32],
@@ -556,7 +556,7 @@ impl Kernel {
     /// Creates a pipeline with specialization constants of any type.
     ///
     /// # Errors
-    /// What the driver answers.
+    /// The driver's result.
     pub fn create(
         gpu: &Gpu,
         words: &[u32],
@@ -611,7 +611,7 @@ impl Kernel {
         unsafe { device.cmd_push_constants(commands, self.layout, stage, 0, bytes) };
     }
 
-    /// Records a dispatch of workgroups over sets.
+    /// Records a dispatch of workgroups with sets.
     pub fn dispatch(
         &self,
         commands: &Commands,
@@ -627,7 +627,7 @@ impl Kernel {
         unsafe { self.gpu.device().cmd_dispatch(commands.raw, x, y, z) };
     }
 
-    /// Dispatches workgroups over sets, and waits.
+    /// Dispatches workgroups with sets, and waits.
     pub fn run(&self, sets: &[vk::DescriptorSet], push: &[u32], groups: [u32; 3]) {
         self.gpu.run(|commands| {
             commands.barrier();
@@ -643,11 +643,11 @@ impl Drop for Kernel {
     }
 }
 
-/// A compute pipeline with the layouts of its sets, and room for one of each.
+/// A compute pipeline with the layouts of its sets, and a pool for one set of each.
 pub struct Compute {
     /// The pipeline.
     pub kernel: Kernel,
-    /// Layouts and room.
+    /// The layouts and the pool.
     pub sets: Sets,
 }
 
@@ -688,7 +688,7 @@ impl Compute {
         Self { kernel, sets }
     }
 
-    /// One set whose first bindings are these storage buffers, whole.
+    /// A set whose first bindings are these storage buffers, each as a whole.
     pub fn storage_set(&self, buffers: &[&Buffer]) -> vk::DescriptorSet {
         let set = self.sets.allocate()[0];
         for (binding, buffer) in (0..).zip(buffers) {

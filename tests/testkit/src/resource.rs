@@ -10,9 +10,9 @@ use crate::gpu::Gpu;
 pub struct Buffer {
     /// The buffer.
     pub raw: vk::Buffer,
-    /// Bytes.
+    /// Its size in bytes.
     pub size: u64,
-    /// Its memory, which it has alone.
+    /// Its memory, which no other resource uses.
     pub memory: vk::DeviceMemory,
     gpu: Gpu,
 }
@@ -25,7 +25,7 @@ impl Buffer {
         buffer
     }
 
-    /// A mappable buffer of zeros for any use. Vulkan has no empty buffers: it has four bytes at least.
+    /// A mappable buffer of zeros for any use. It has at least four bytes, since Vulkan has no empty buffers.
     pub fn new(gpu: &Gpu, size: u64) -> Self {
         use vk::MemoryPropertyFlags as Flags;
         let buffer = Self::within(gpu, size, Flags::HOST_VISIBLE | Flags::HOST_COHERENT);
@@ -33,7 +33,7 @@ impl Buffer {
         buffer
     }
 
-    /// A buffer for any use in the first memory type that has `flags`; what it holds is undefined.
+    /// A buffer for any use in the first memory type that has `flags`. Its contents are undefined.
     pub fn within(gpu: &Gpu, size: u64, flags: vk::MemoryPropertyFlags) -> Self {
         use vk::BufferUsageFlags as Usage;
         let size = size.max(4);
@@ -73,7 +73,7 @@ impl Buffer {
         self.mapped(|to| unsafe { to.copy_from_nonoverlapping(bytes.as_ptr(), bytes.len()) });
     }
 
-    /// What a mappable buffer holds.
+    /// The bytes of a mappable buffer.
     pub fn read(&self) -> Vec<u8> {
         let mut bytes = vec![0; self.size as usize];
         // SAFETY: the mapping is at least as long as the buffer, and the device is idle.
@@ -83,7 +83,7 @@ impl Buffer {
         bytes
     }
 
-    /// What a mappable buffer holds, as values.
+    /// The contents of a mappable buffer, as values.
     pub fn values<T: AnyBitPattern>(&self) -> Vec<T> {
         let bytes = self.read();
         let values = bytes.chunks_exact(size_of::<T>());
@@ -131,29 +131,29 @@ fn allocate(
     unsafe { gpu.device().allocate_memory(&info, None) }.expect("memory")
 }
 
-/// What an [`Image`] is like.
+/// The options of an [`Image`].
 #[derive(Clone, Copy, Debug)]
 pub struct ImageOptions {
     /// Its format.
     pub format: vk::Format,
     /// Width, height and depth.
     pub size: [u32; 3],
-    /// Levels.
+    /// Number of levels.
     pub levels: u32,
-    /// Layers.
+    /// Number of layers.
     pub layers: u32,
     /// Samples per texel.
     pub samples: u32,
-    /// What it is used for; transfers are added.
+    /// Its usage; transfers are added.
     pub usage: vk::ImageUsageFlags,
-    /// The view's type, which decides the image's.
+    /// The view's type, which determines the image's type.
     pub view: vk::ImageViewType,
-    /// Flags beside what the view asks for.
+    /// Flags in addition to those that the view requires.
     pub flags: vk::ImageCreateFlags,
 }
 
 impl ImageOptions {
-    /// A flat image of one level, one layer and one sample.
+    /// A 2D image of one level, one layer and one sample.
     pub fn new(format: vk::Format, [width, height]: [u32; 2], usage: vk::ImageUsageFlags) -> Self {
         Self {
             format,
@@ -201,7 +201,7 @@ impl ImageOptions {
         }
     }
 
-    /// Reports whether images of this use have views.
+    /// Returns true if images of this usage can have views.
     fn has_views(&self) -> bool {
         use vk::ImageUsageFlags as Usage;
         self.usage.intersects(
@@ -214,13 +214,13 @@ impl ImageOptions {
     }
 }
 
-/// An image in the layout `GENERAL`, with a view of all of it if its use has views.
+/// An image in the layout `GENERAL`, with a view of all of it if its usage permits views.
 pub struct Image {
     /// The image.
     pub raw: vk::Image,
-    /// The view, of depth alone where there is depth and stencil.
+    /// The view, of the depth aspect alone if there is depth and stencil.
     pub view: vk::ImageView,
-    /// What it is like.
+    /// Its options.
     pub options: ImageOptions,
     /// A view of both aspects, for attachments.
     pub attachment: vk::ImageView,
@@ -229,7 +229,7 @@ pub struct Image {
 }
 
 impl Image {
-    /// Creates it. Its contents are undefined.
+    /// Creates the image. Its contents are undefined.
     pub fn new(gpu: &Gpu, options: &ImageOptions) -> Self {
         use vk::ImageUsageFlags as Usage;
         let [width, height, depth] = options.size;
@@ -314,7 +314,7 @@ impl Image {
         image
     }
 
-    /// A copy of one level of all layers.
+    /// A copy of one level with all its layers.
     pub fn region(&self, aspect: vk::ImageAspectFlags, level: u32) -> vk::BufferImageCopy {
         let [width, height, depth] = self.options.level_size(level);
         let layers = vk::ImageSubresourceLayers {
@@ -351,7 +351,7 @@ impl Image {
         texels.map(bytemuck::pod_read_unaligned).collect()
     }
 
-    /// A copy of every level of an aspect: where each lies in a buffer, and its bytes there; and the bytes of all.
+    /// Copies of every level of an aspect to a buffer, with the bytes of each, and the total number of bytes.
     fn staged(&self, aspect: vk::ImageAspectFlags) -> (Vec<(vk::BufferImageCopy, usize)>, u64) {
         let plane = aspect_format(self.options.format, aspect);
         let mut offset = 0;
@@ -367,7 +367,7 @@ impl Image {
         (regions, offset)
     }
 
-    /// Writes all texels of an aspect, levels from the largest down, in them layers, tightly packed.
+    /// Writes all texels of an aspect, tightly packed: levels from the largest down, and layers within each level.
     pub fn upload(&self, aspect: vk::ImageAspectFlags, texels: &[u8]) {
         let (levels, size) = self.staged(aspect);
         let mut staged = vec![0; size as usize];
@@ -398,7 +398,7 @@ impl Image {
         levels.collect()
     }
 
-    /// The device that it is on.
+    /// The device of the image.
     pub fn gpu(&self) -> &Gpu {
         &self.gpu
     }
@@ -426,7 +426,7 @@ impl From<&Image> for vk::Image {
 /// The device's format of the same name.
 ///
 /// # Panics
-/// If it has none.
+/// If the device has none.
 pub fn device_format(format: vk::Format) -> Format {
     let name = format!("{format:?}").replace('_', "");
     let found = Format::ALL.iter().copied();
@@ -471,7 +471,7 @@ pub fn aspects(format: vk::Format) -> vk::ImageAspectFlags {
     }
 }
 
-/// A format as attachments of depth and of stencil have it: undefined for the aspect that it lacks.
+/// The formats of the depth and the stencil attachment; undefined for an aspect that the format lacks.
 pub fn depth_and_stencil(format: vk::Format) -> (vk::Format, vk::Format) {
     let of = |aspect| {
         if aspects(format).contains(aspect) {
@@ -486,7 +486,7 @@ pub fn depth_and_stencil(format: vk::Format) -> (vk::Format, vk::Format) {
     )
 }
 
-/// All levels and layers.
+/// All levels and layers of the aspects.
 pub fn range(aspects: vk::ImageAspectFlags) -> vk::ImageSubresourceRange {
     vk::ImageSubresourceRange {
         aspect_mask: aspects,
@@ -505,7 +505,7 @@ pub struct Sampler {
 }
 
 impl Sampler {
-    /// Creates it.
+    /// Creates the sampler.
     pub fn new(gpu: &Gpu, info: &vk::SamplerCreateInfo<'_>) -> Self {
         // SAFETY: see the crate.
         let raw = unsafe { gpu.device().create_sampler(info, None) }.expect("a sampler");

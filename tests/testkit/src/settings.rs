@@ -1,24 +1,23 @@
-//! How a device of the embedded driver works: the environment variables that it reads when it is
-//! created.
+//! Settings of a device of the embedded driver: the environment variables that it reads when it is created.
 
 use std::ffi::{OsStr, OsString};
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
-/// What a device is told by the environment.
+/// The settings of a device.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Settings<'a> {
-    /// The SIMD level by name, `GAURAST_SIMD`; as it is by default.
+    /// The name of the SIMD level, `GAURAST_SIMD`, or `None` for the default.
     pub simd: Option<&'a str>,
-    /// Worker threads, `GAURAST_THREADS`; as it is by default.
+    /// The number of worker threads, `GAURAST_THREADS`, or `None` for the default.
     pub threads: Option<usize>,
-    /// Where its work is written when it is gone, `GAURAST_TRACE`.
+    /// The file to which the device's work is written when the device is destroyed, `GAURAST_TRACE`.
     pub trace: Option<&'a Path>,
 }
 
-/// Calls `create`, which creates devices, while the environment says `settings`.
+/// Calls `create`, which creates devices, with `settings` in the environment.
 ///
-/// Calls wait for each other, so that devices which are opened through this get no others' settings.
+/// Calls wait for each other, so that no device gets the settings of another call.
 pub fn with_settings<R>(settings: &Settings, create: impl FnOnce() -> R) -> R {
     static LOCK: Mutex<()> = Mutex::new(());
     let _lock = LOCK.lock().unwrap_or_else(PoisonError::into_inner);
@@ -34,7 +33,7 @@ pub fn with_settings<R>(settings: &Settings, create: impl FnOnce() -> R) -> R {
     create()
 }
 
-/// An environment variable that gets its old value back.
+/// An environment variable whose old value is restored on drop.
 struct Variable {
     name: &'static str,
     before: Option<OsString>,
@@ -43,9 +42,9 @@ struct Variable {
 impl Variable {
     fn set(name: &'static str, value: &OsStr) -> Self {
         let before = std::env::var_os(name);
-        // SAFETY: the standard library guards the environment against its own readers and writers,
-        // of which the embedded driver is one. The Vulkan loader and lavapipe, which aren't, read it
-        // when they are opened, and that waits for `with_settings`.
+        // SAFETY: the standard library guards the environment against its own readers and writers, of which the
+        // embedded driver is one. The Vulkan loader and lavapipe are not; they read it when they are opened, and that
+        // waits for `with_settings`.
         unsafe { std::env::set_var(name, value) };
         Self { name, before }
     }

@@ -1,5 +1,4 @@
-//! Shaders written in GLSL, compiled by `glslangValidator` when a test needs them and kept for the
-//! next time.
+//! Shaders in GLSL. `glslangValidator` compiles them when a test needs them, and the result is kept for later runs.
 
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -7,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::{LazyLock, Mutex, PoisonError};
 
-/// A stage that shaders are written for.
+/// A shader stage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Stage {
     /// Vertex shaders.
@@ -28,14 +27,14 @@ impl Stage {
     }
 }
 
-/// The SPIR-V of GLSL `source`, to which `#version 450` is added in front.
+/// The SPIR-V of GLSL `source`, which is preceded by `#version 450`.
 ///
 /// # Panics
 /// If the source is wrong, or there is no compiler.
 pub fn compile(stage: Stage, source: &str) -> Vec<u32> {
     type Compiled = Mutex<HashMap<(Stage, String), Vec<u32>>>;
     static COMPILED: LazyLock<Compiled> = LazyLock::new(Mutex::default);
-    // Held while compiling, so that nothing is compiled twice.
+    // The lock is held while compiling, so that nothing is compiled twice.
     let mut compiled = COMPILED.lock().unwrap_or_else(PoisonError::into_inner);
     let key = (stage, source.to_owned());
     compiled
@@ -50,7 +49,7 @@ fn kept_or_compiled(stage: Stage, source: &str) -> Vec<u32> {
     (stage, source).hash(&mut hasher);
     let path = folder.join(format!("{:016x}.{}", hasher.finish(), stage.suffix()));
     let kept = path.with_extension("spv");
-    // The source is kept too, so that a clash of hashes cannot exchange shaders.
+    // The source is compared too, so that a hash collision cannot exchange shaders.
     if std::fs::read_to_string(&path).is_ok_and(|text| text == whole(source))
         && let Ok(bytes) = std::fs::read(&kept)
     {
@@ -64,7 +63,7 @@ fn whole(source: &str) -> String {
     format!("#version 450\n{source}")
 }
 
-/// Compiles under names of this process alone, then moves the files to where others look.
+/// Compiles to file names of this process alone, then moves the files to their final names.
 fn compile_to(stage: Stage, source: &str, path: &Path, kept: &Path) -> Vec<u32> {
     let mine = |path: &Path| -> PathBuf {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -85,7 +84,7 @@ fn compile_to(stage: Stage, source: &str, path: &Path, kept: &Path) -> Vec<u32> 
         String::from_utf8_lossy(&output.stderr)
     );
     let bytes = std::fs::read(&my_spirv).expect("SPIR-V is there");
-    // The source last, since it says that the SPIR-V is complete.
+    // The source is moved last; its presence means that the SPIR-V is complete.
     std::fs::rename(&my_spirv, kept).expect("it is kept");
     std::fs::rename(&my_source, path).expect("it is kept");
     bytemuck::pod_collect_to_vec(&bytes)

@@ -1,4 +1,4 @@
-//! What scenes draw to, and how it is read back.
+//! The attachments of scenes, and reading them back.
 
 use ash::vk;
 
@@ -9,7 +9,7 @@ use crate::pass::{Attachments, Formats, Pass};
 use crate::pipeline::{Pipeline, PipelineOptions};
 use crate::resource::{Image, ImageOptions, Sampler, aspects, depth_and_stencil, texel_size};
 
-/// What a [`Target`] is like.
+/// The options of a [`Target`].
 #[derive(Clone, Debug)]
 pub struct TargetOptions {
     /// Width and height.
@@ -20,7 +20,7 @@ pub struct TargetOptions {
     pub depth: Option<vk::Format>,
     /// Samples per pixel.
     pub samples: u32,
-    /// Whether colours of several samples are resolved at the end of each pass.
+    /// True if colours of several samples are resolved at the end of each pass.
     pub resolve: bool,
 }
 
@@ -61,20 +61,20 @@ impl TargetOptions {
     }
 }
 
-/// Attachments.
+/// The attachments of a pass.
 pub struct Target {
-    /// What it is like.
+    /// Its options.
     pub options: TargetOptions,
     /// Colour attachments.
     pub colors: Vec<Image>,
-    /// What they are resolved to, where they have several samples.
+    /// The resolve attachments, if there are several samples.
     pub resolved: Vec<Image>,
     /// Depth and stencil.
     pub depth: Option<Image>,
 }
 
 impl Target {
-    /// Creates it. Its contents are undefined.
+    /// Creates the attachments. Their contents are undefined.
     pub fn new(gpu: &Gpu, options: &TargetOptions) -> Self {
         use vk::ImageUsageFlags as Usage;
         let image = |format, samples, attachment: Usage| {
@@ -126,14 +126,14 @@ impl Target {
         pass.area.unwrap_or(whole)
     }
 
-    /// One pass of `draws`, then everything that the target holds.
+    /// Draws one pass of `draws`, and returns the contents of the target.
     pub fn draw(&self, gpu: &Gpu, pass: &Pass, draws: impl FnOnce(&Commands)) -> Output {
         gpu.run(|commands| commands.pass(self, pass, || draws(commands)));
         self.output(gpu)
     }
 
-    /// Everything that the target holds: colours, depth and stencil; for several samples, what
-    /// they were resolved to and each sample.
+    /// The contents of the target: colours, depth and stencil. With several samples, the resolved colours and each
+    /// sample.
     pub fn output(&self, gpu: &Gpu) -> Output {
         let mut pictures = Vec::new();
         let resolved = self.resolved.iter().enumerate();
@@ -241,7 +241,7 @@ pub struct PassObject<'a> {
 }
 
 impl<'a> PassObject<'a> {
-    /// A render pass that clears `target` and keeps what is drawn.
+    /// A render pass that clears `target` and stores its contents.
     pub fn new(target: &'a Target) -> Self {
         let attachments = [vk::AttachmentDescription::default()
             .format(target.options.colors[0])
@@ -343,7 +343,7 @@ fn is_integer(format: vk::Format) -> bool {
     name.contains("UINT") || name.contains("SINT")
 }
 
-/// Shaders that copy one sample of each pixel.
+/// Shaders that fill the picture and copy one sample of each pixel.
 const WHOLE: &str = "
     void main() {
         vec2 corner = vec2(gl_VertexIndex & 1, gl_VertexIndex >> 1);

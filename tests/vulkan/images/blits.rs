@@ -1,8 +1,9 @@
-//! `vkCmdBlitImage` beside lavapipe's.
+//! `vkCmdBlitImage`, compared with lavapipe's.
 //!
-//! Vulkan leaves to an implementation (Vulkan 1.3, "Image Copies With Scaling"): the precision of coordinates and
-//! weights, hence which texel is nearest where a centre lies on an edge between texels, and whether filters reach beyond
-//! the source's region into the rest of the image. Regions here avoid the first; both implementations do the second.
+//! Vulkan leaves two things to an implementation (Vulkan 1.3, "Image Copies With Scaling"). One is the precision of
+//! coordinates and weights, and with it the choice of the nearest texel if a centre is on an edge between texels. The
+//! other is if filters read texels outside the source's region. Regions here avoid the first; both implementations read
+//! outside the region.
 
 use super::lavapipe::{aspect_flags, exactly, expect_lacking, formats};
 use super::texels::{Noise, distance};
@@ -15,7 +16,7 @@ use simdevice::format::{Aspect, Numeric};
 
 const GENERAL: vk::ImageLayout = vk::ImageLayout::GENERAL;
 
-/// A 2D image that is only copied and blitted.
+/// Options of a 2D image that is only copied and blitted.
 fn flat(format: vk::Format, width: u32, height: u32) -> ImageOptions {
     ImageOptions::new(format, [width, height], vk::ImageUsageFlags::empty())
 }
@@ -102,7 +103,7 @@ fn compare(ours: &Gpu, theirs: &Gpu, blit: &Blit, unit: f64) -> f64 {
     largest
 }
 
-/// Lists what is too far apart and fails if there is any.
+/// Collects differences that are too large, and fails if there are any.
 #[derive(Default)]
 struct Findings(Vec<String>);
 
@@ -133,7 +134,8 @@ const FILTERS: [vk::Filter; 2] = [vk::Filter::NEAREST, vk::Filter::LINEAR];
 fn regions_are_scaled_and_mirrored(case: &Case) {
     exactly(case, |ours, theirs| {
         let format = vk::Format::R8G8B8A8_UNORM;
-        // From and to along one axis of 13 and 17 texels. An odd number of texels has no centre on an edge between them.
+        // The source and target ranges along an axis, of 13 and 17 texels. An odd number of texels has no centre on an
+        // edge between them.
         let spans: [([i32; 2], [i32; 2]); 7] = [
             ([0, 13], [0, 13]),
             ([0, 13], [0, 17]),
@@ -191,7 +193,7 @@ fn mip_chains_are_made_of_layers(case: &Case) {
                 layers: 3,
                 ..flat(format, 24, 20)
             };
-            // Halving an even number puts the centres on edges, where a nearest texel is anyone's.
+            // Halving an even number puts the centres on edges, where the nearest texel is not defined.
             let filter = vk::Filter::LINEAR;
             for level in 1..4 {
                 let extent = |level: u32| {
@@ -217,7 +219,7 @@ fn mip_chains_are_made_of_layers(case: &Case) {
     });
 }
 
-/// The class of formats that convert to each other.
+/// The class of a format; only formats of one class can be converted to each other.
 fn class(format: Format) -> u32 {
     match format.numeric() {
         Numeric::Uint => 0,
@@ -226,7 +228,7 @@ fn class(format: Format) -> u32 {
     }
 }
 
-/// The formats that lavapipe is known not to blit from (Mesa 22.3).
+/// The formats that lavapipe is known not to support as sources (Mesa 22.3).
 const NO_SOURCES: &[vk::Format] = &[
     vk::Format::R4G4_UNORM_PACK8,
     vk::Format::R4G4B4A4_UNORM_PACK16,
@@ -258,7 +260,7 @@ const NO_SOURCES: &[vk::Format] = &[
     vk::Format::R32G32B32_SFLOAT,
 ];
 
-/// The formats that lavapipe is known to blit from, but not to (Mesa 22.3).
+/// The formats that lavapipe is known to support as sources, but not as targets (Mesa 22.3).
 const SOURCES_ONLY: &[vk::Format] = &[
     vk::Format::B10G11R11_UFLOAT_PACK32,
     vk::Format::E5B9G9R9_UFLOAT_PACK32,
@@ -304,8 +306,8 @@ fn formats_are_converted(case: &Case) {
             if from_class != to_class {
                 continue;
             }
-            // lavapipe decodes sRGB by a polynomial that is off by 1e-3: enough for 8 bits. (Ours is checked against the
-            // transfer function where formats are.)
+            // lavapipe decodes sRGB by a polynomial with an error of 1e-3, which is sufficient for 8 bits. (This
+            // driver's decoding is compared with the transfer function in the tests of formats.)
             let is_srgb = device_format(from).numeric() == Numeric::Srgb;
             if is_srgb && device_format(to).components()[0].bits > 8 {
                 continue;
@@ -315,7 +317,8 @@ fn formats_are_converted(case: &Case) {
             } else {
                 &FILTERS[..1]
             };
-            // A binary16's step at 2, the least mantissa's, or what coordinates in binary32 leave of weights.
+            // A binary16's step at 2, the step of the shortest mantissa, or the error of weights from binary32
+            // coordinates.
             let unit = match device_format(to) {
                 Format::B10G11R11UfloatPack32 => 2.0 / 32.0,
                 Format::E5B9G9R9UfloatPack32 => 2.0 / 256.0,

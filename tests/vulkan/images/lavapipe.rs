@@ -1,11 +1,11 @@
-//! This driver's device and lavapipe's, as exact as it can be, and what both can do.
+//! This driver's device and lavapipe's, both as accurate as possible, and the formats that both support.
 
 use ash::vk;
 use gaurast_runner::{Case, Missing, ignore};
 use gaurast_testkit::{Gpu, Settings};
 use simdevice::format::Aspect;
 
-/// An aspect as Vulkan has it.
+/// The Vulkan flags of an aspect.
 pub fn aspect_flags(aspect: Aspect) -> vk::ImageAspectFlags {
     match aspect {
         Aspect::Color => vk::ImageAspectFlags::COLOR,
@@ -14,13 +14,13 @@ pub fn aspect_flags(aspect: Aspect) -> vk::ImageAspectFlags {
     }
 }
 
-/// The formats that both devices are capable of something with, and those that ours alone is.
+/// The formats that both devices support for a use, and those that only this driver supports.
 pub struct Formats {
     pub of_both: Vec<vk::Format>,
     pub of_ours_alone: Vec<vk::Format>,
 }
 
-/// Finds the formats up to `last` with which devices are capable of something, as `is_capable` says.
+/// Finds the formats up to `last` that devices support for a use; `is_capable` tests one.
 pub fn formats(
     ours: &Gpu,
     theirs: &Gpu,
@@ -37,8 +37,8 @@ pub fn formats(
     }
 }
 
-/// Ends the test as ignored if some of lavapipe's `operations` lack formats beside those that are known to be missing,
-/// so that less was compared than should be.
+/// Ends the test as ignored if lavapipe lacks more formats for `operations` than are known, because fewer formats were
+/// then compared than expected.
 pub fn expect_lacking(operations: &str, lacking: &[vk::Format], known: &[vk::Format]) {
     let new: Vec<_> = lacking
         .iter()
@@ -50,8 +50,8 @@ pub fn expect_lacking(operations: &str, lacking: &[vk::Format], known: &[vk::For
     }
 }
 
-/// Runs `inside` on this device and lavapipe, in a process of its own where lavapipe filters in binary32 and takes no
-/// short cuts. The test needs lavapipe.
+/// Runs `inside` with this device and lavapipe, in a process of its own in which lavapipe filters in binary32 and uses
+/// no approximations. The test needs lavapipe.
 pub fn exactly(case: &Case, inside: impl FnOnce(&Gpu, &Gpu)) {
     if case.is_alone() {
         let ours = Gpu::embedded(&Settings::default()).expect("this driver's device");

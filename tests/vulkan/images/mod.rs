@@ -1,5 +1,6 @@
-//! Images side by side with lavapipe: what blits, samples and stores give there, they give here. The shaders' SPIR-V is
-//! checked in beside them: `glslangValidator -V --target-env vulkan1.3`. Objects that a device outlives are its drop's.
+//! Images compared with lavapipe: blits, samples and stores give the same results. The shaders' SPIR-V is checked in
+//! next to their sources: `glslangValidator -V --target-env vulkan1.3`. Types that own Vulkan objects destroy them when
+//! they are dropped.
 
 mod blits;
 mod lavapipe;

@@ -1,7 +1,7 @@
-//! The texture unit beside lavapipe's, both made as exact as they can be: what they read may differ by 1/255.
+//! Texture sampling, compared with lavapipe's, both as accurate as possible. Results may differ by 1/255.
 //!
-//! Requests keep away from where Vulkan leaves the choice to an implementation: nearest texels from edges between texels,
-//! nearest levels and the choice of a filter from where they change over.
+//! Requests avoid the cases that Vulkan leaves to an implementation: nearest texels near edges between texels, nearest
+//! levels near the change of level, and levels of detail at which minification and magnification change.
 
 use super::lavapipe::{aspect_flags, exactly, expect_lacking, formats};
 use super::texels::Noise;
@@ -15,7 +15,7 @@ use gaurast_testkit::{
 use simdevice::format::Aspect;
 use std::cell::OnceCell;
 
-/// The bindings of the images, in the shader's order.
+/// The kinds of images, in the order of the shader's bindings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     One,
@@ -43,7 +43,7 @@ const KINDS: [Kind; 10] = [
     Kind::CubeShadow,
 ];
 
-/// The function that a shader samples by.
+/// The sampling function of a shader.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Way {
     Lod,
@@ -94,7 +94,8 @@ impl Kind {
         }
     }
 
-    /// The image: its sides are powers of two, so that edges of texels of small levels are edges of large ones too.
+    /// The options of the image. Its sides are powers of two, so that edges between texels of small levels are also
+    /// edges of large ones.
     fn shape(self, format: vk::Format) -> ImageOptions {
         let size = match self {
             Self::One | Self::Ones => [32, 1, 1],
@@ -117,16 +118,16 @@ impl Kind {
     }
 }
 
-/// An invocation's request: see the shader.
+/// An invocation's request; its layout is in the shader.
 type Request = [[f32; 4]; 3];
 
-/// A coordinate well inside some texel of an axis, or of one of its repetitions.
+/// A coordinate well inside some texel of an axis, or inside one of its repetitions.
 fn inside_a_texel(noise: &mut Noise, size: u32) -> f32 {
     let texel = (noise.bits() % (5 * size)) as f32 - 2.0 * size as f32;
     (texel + 0.1 + 0.8 * noise.unit()) / size as f32
 }
 
-/// A level of detail well away from where levels or filters change over.
+/// A level of detail well away from changes of level or filter.
 fn level_of_detail(noise: &mut Noise) -> f32 {
     let whole = (noise.bits() % (LEVELS + 2)) as f32 - 2.0;
     let half = 0.5 * (noise.bits() % 2) as f32;
@@ -138,10 +139,10 @@ fn request(kind: Kind, noise: &mut Noise) -> Request {
     let lod = level_of_detail(noise);
     let mut at = [0.0; 4];
     let (mut dx, mut dy) = ([0.0; 4], [0.0; 4]);
-    // lavapipe's logarithm is a straight line between powers of two. (Vulkan 1.3, "LOD Operation", wants no more.)
+    // lavapipe's logarithm is linear between powers of two. (Vulkan 1.3, "LOD Operation", requires no more.)
     let rho = lod.floor().exp2();
     if kind.is_cube() {
-        // A place on a face, whose longest axis is `major`, seen from afar or near.
+        // A direction towards a face with the longest axis `major`, of any length.
         let major = (noise.bits() % 3) as usize;
         let scale = 0.5 + noise.unit();
         let sign = if noise.bits().is_multiple_of(2) {
@@ -189,7 +190,7 @@ struct Bench<'a> {
 impl<'a> Bench<'a> {
     fn new(gpu: &'a Gpu, color: vk::Format, depth: vk::Format) -> Self {
         let images = KINDS.iter().map(|&kind| {
-            // Blocks of texels make 2D images; others are there for the shader's sake.
+            // Compressed formats are tested with 2D images; the other images exist only for the shader's bindings.
             let is_flat = !matches!(kind, Kind::One | Kind::Three | Kind::Ones);
             let format = match kind {
                 _ if kind.compares() => depth,
@@ -222,7 +223,7 @@ impl<'a> Bench<'a> {
         requests: &[Request],
     ) -> Vec<[f32; 4]> {
         self.requests.write(requests);
-        // Only images of depth are compared with.
+        // Only depth images are compared with a reference.
         let samplers =
             [false, true].map(|compares| Sampler::new(self.gpu, &sampler.compare_enable(compares)));
         let images = KINDS.iter().zip(&self.images).map(|(kind, image)| {
@@ -242,7 +243,7 @@ impl<'a> Bench<'a> {
     }
 }
 
-/// Both devices with the same images, and what was found.
+/// Both devices with the same images, and the differences found.
 struct Comparison<'a> {
     ours: Bench<'a>,
     theirs: Bench<'a>,
@@ -264,14 +265,14 @@ impl<'a> Comparison<'a> {
         }
         let mut noise = Noise::new(100 + kind as u64);
         let requests: Vec<_> = (0..REQUESTS).map(|_| request(kind, &mut noise)).collect();
-        // Gradients here make whole levels of detail, where nearest filters and levels change over.
+        // Gradients here give integer levels of detail, where nearest filters and levels change.
         let bias = if way == Way::Gradient { 0.3 } else { 0.0 };
         let sampler = &sampler.mip_lod_bias(sampler.mip_lod_bias + bias);
         let ours = self.ours.sample(kind, way, sampler, &requests);
         let theirs = self.theirs.sample(kind, way, sampler, &requests);
         let apart = |a: &[f32; 4], b: &[f32; 4]| {
             let each = a.iter().zip(b);
-            // Beyond 1, in proportion.
+            // Values beyond 1 are compared in proportion.
             let each = each.map(|(a, b)| (a - b).abs() / b.abs().max(1.0));
             each.fold(0.0, f32::max)
         };
@@ -416,15 +417,15 @@ fn borders_biases_and_limits(case: &Case) {
     });
 }
 
-/// Reports whether lavapipe filters a format exactly. It interpolates BC1 to BC5 in integers of 8 bits and truncates, so
-/// that it is off by a code and more. (Ours are checked against the exact values where blocks are decoded.)
+/// Returns true if lavapipe filters a format exactly. It interpolates BC1 to BC5 in 8-bit integers and truncates, with
+/// an error of a code or more. (This driver's results are compared with exact values in the tests of block decoding.)
 fn is_exact(format: vk::Format) -> bool {
     let name = format!("{format:?}");
     let truncated = ["BC1", "BC2", "BC3", "BC4", "BC5"];
     !truncated.iter().any(|block| name.starts_with(block))
 }
 
-/// The formats of colour that lavapipe is known not to filter (Mesa 22.3).
+/// The colour formats that lavapipe is known not to filter (Mesa 22.3).
 const NOT_FILTERED: &[vk::Format] = &[
     vk::Format::R4G4_UNORM_PACK8,
     vk::Format::R4G4B4A4_UNORM_PACK16,
@@ -460,7 +461,7 @@ fn every_format_is_filtered(case: &Case) {
                 continue;
             }
             let mut comparison = Comparison::new(ours, theirs, format, DEPTH);
-            // Numbers of very different sizes have no mean worth comparing.
+            // Interpolated values between numbers of very different sizes cannot be compared well.
             let is_huge = format!("{format:?}").starts_with("BC6H");
             let filter = FILTERS[if is_huge { 0 } else { 4 }];
             comparison.check(Kind::Two, Way::Lod, &sampler(filter, 0));

@@ -1,4 +1,4 @@
-//! Storage images and texel buffers beside lavapipe's, format by format.
+//! Storage images and texel buffers, compared with lavapipe's, format by format.
 
 use super::lavapipe::{exactly, expect_lacking, formats};
 use super::texels::{Noise, distance};
@@ -37,7 +37,7 @@ impl Class {
         }
     }
 
-    /// A format of this class that every device stores and fetches: it stands in for those that can't.
+    /// A format of this class that every device supports. It replaces unsupported formats.
     fn always(self) -> vk::Format {
         match self {
             Self::Float => vk::Format::R32G32B32A32_SFLOAT,
@@ -49,7 +49,7 @@ impl Class {
 
 const VALUES: usize = 64;
 
-/// Values that a format holds, and for those that clamp some that it doesn't.
+/// Values that a format can hold, and for formats that clamp also some that it cannot.
 fn values(format: Format, noise: &mut Noise) -> Vec<[u32; 4]> {
     let narrowest = format.components().iter().map(|c| c.bits).min().unwrap();
     let value = |noise: &mut Noise| match Class::of(format) {
@@ -69,7 +69,7 @@ struct Outcome {
     fetched: Vec<f32>,
 }
 
-/// Formats of the image, the texel buffer that is stored to and the one that is fetched from.
+/// Formats of the storage image, the storage texel buffer and the uniform texel buffer.
 type Formats = [vk::Format; 3];
 
 fn outcome(gpu: &Gpu, class: Class, formats: Formats, values: &[[u32; 4]]) -> Outcome {
@@ -108,7 +108,7 @@ fn outcome(gpu: &Gpu, class: Class, formats: Formats, values: &[[u32; 4]]) -> Ou
     let found = results.values::<f32>().into_iter();
     let fetched_values = match class {
         Class::Float => found.collect(),
-        // Within the integers that 24 bits hold, or wrong at once.
+        // Integers up to 2^24 are exact as floats, and a larger wrong one still differs.
         Class::Uint | Class::Sint => found.map(|word| word.to_bits() as f32).collect(),
     };
     let outcome = Outcome {
@@ -201,7 +201,7 @@ fn every_format_is_stored_and_fetched(case: &Case) {
             }
             let values = a.fetched.iter().zip(&b.fetched);
             let apart = values.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
-            // lavapipe decodes sRGB by a polynomial that is off by 1e-3.
+            // lavapipe decodes sRGB by a polynomial with an error of 1e-3.
             let limit = if plain.numeric() == Numeric::Srgb {
                 1.0 / 255.0
             } else {
@@ -212,7 +212,7 @@ fn every_format_is_stored_and_fetched(case: &Case) {
             }
         }
         assert!(findings.is_empty(), "{}", findings.join("\n"));
-        // As many as Vulkan requires, at least.
+        // At least as many formats as Vulkan requires.
         let counts = [&images, &stored, &fetched].map(|found| found.of_both.len());
         assert!(
             counts[0] >= 16 && counts[1] >= 20 && counts[2] >= 36,

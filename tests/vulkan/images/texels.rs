@@ -1,4 +1,4 @@
-//! Texels: made up, and compared code by code.
+//! Random texels, and their comparison code by code.
 
 use simdevice::Format;
 use simdevice::format::Numeric;
@@ -19,7 +19,7 @@ impl Noise {
         (self.0 >> 32) as u32
     }
 
-    /// From 0 to 1.
+    /// A number from 0 to 1.
     pub fn unit(&mut self) -> f32 {
         (self.bits() >> 8) as f32 / (1 << 24) as f32
     }
@@ -29,7 +29,7 @@ impl Noise {
         4.0 * self.unit() - 2.0
     }
 
-    /// Random texels: of floating-point formats numbers around 1, of others any bits.
+    /// Random texels: numbers around 1 in floating-point formats, any bits in others.
     pub fn texels(&mut self, format: Format, count: usize) -> Vec<u8> {
         let size = format.texel_size();
         (0..count)
@@ -49,8 +49,8 @@ impl Noise {
     }
 }
 
-/// The distance between two texels of a format: in codes, or for floating-point formats in units of `unit`. Integers that
-/// differ are infinitely apart, bits that mean nothing are not looked at.
+/// The distance between two texels of a format: in codes, or for floating-point formats in units of `unit`. Different
+/// integers are infinitely far apart, and unused bits are ignored.
 pub fn distance(format: Format, a: &[u8], b: &[u8], unit: f64) -> f64 {
     let worst = |distances: [f64; 4]| distances.into_iter().fold(0.0, f64::max);
     let (x, y) = (format.decode(a), format.decode(b));

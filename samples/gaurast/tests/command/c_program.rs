@@ -1,17 +1,18 @@
-//! The C sample, built with the system's compiler against the header and the loader, draws what the Rust one draws.
+//! The C sample, built with the system's compiler against the header and the loader, draws the same picture as the Rust
+//! sample.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use gaurast_runner::Need;
 
-/// The folder of this profile's build, which holds `examples/` and `deps/`.
+/// The build folder of this profile, which holds `examples/` and `deps/`.
 fn build_folder() -> PathBuf {
     let test = std::env::current_exe().expect("the test's own path");
     test.ancestors().nth(2).expect("deps lies in it").to_owned()
 }
 
-/// Runs a command to its end.
+/// Runs a command and checks that it succeeds.
 fn succeed(command: &mut Command) {
     let output = command.output().expect("the command starts");
     assert!(

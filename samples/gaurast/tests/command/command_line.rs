@@ -1,4 +1,4 @@
-//! The `gaurast` command as people meet it: pictures, messages, exit codes.
+//! Tests of the `gaurast` command: pictures, messages, exit codes.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -19,7 +19,7 @@ fn folder() -> TempDir {
     tempfile::tempdir().expect("a folder")
 }
 
-/// A PLY file of one Gaussian at (0, 0, 3), 0.3 wide, and of colour (1, 0.5, 0).
+/// A PLY file of one Gaussian at (0, 0, 3) with size 0.3 and colour (1, 0.5, 0).
 const ONE: &str = "ply\nformat ascii 1.0\nelement vertex 1\n\
     property float x\nproperty float y\nproperty float z\n\
     property float scale_0\nproperty float scale_1\nproperty float scale_2\n\
@@ -32,7 +32,7 @@ fn write(folder: &TempDir, name: &str, text: &str) {
     std::fs::write(folder.path().join(name), text).expect("written");
 }
 
-/// Runs that fail: exit code 1, one line on stderr that begins with `message`, nothing written.
+/// Checks that a run fails: exit code 1, one line on stderr that begins with `message`, and no file.
 #[track_caller]
 fn fails(folder: &TempDir, arguments: &[&str], message: &str) {
     let files = |folder: &TempDir| std::fs::read_dir(folder).expect("readable").count();
@@ -148,7 +148,7 @@ fn counters_tell_of_every_stage_of_the_simulated_hardware_if_they_are_asked_for(
 fn a_panorama_and_a_fisheye_see_what_is_behind_and_beside() {
     let folder = folder();
     write(&folder, "one.ply", ONE);
-    // Away from the Gaussian, then with it on the right.
+    // The camera looks away from the Gaussian, then has it on the right.
     for (model, target, at) in [
         ("equirectangular", "0,0,-1", [0, 31]),
         ("equirectangular", "-1,0,0", [24, 24]),
@@ -213,7 +213,7 @@ fn a_camera_file_gives_view_and_size() {
     assert!(second.get_pixel(20, 15).0[3] > 0.98);
     let resized = render(&["--view", "1", "--size", "123x31"]);
     assert_eq!(resized.dimensions(), (123, 31));
-    // Thrice as wide: the same value at thrice the distance from the centre.
+    // The picture is three times as wide: the same value is at three times the distance from the centre.
     let (a, b) = (
         second.get_pixel(22, 15).0[3],
         resized.get_pixel(67, 15).0[3],
@@ -340,7 +340,7 @@ fn without_arguments_it_draws_the_garden() {
         .expect("a PNG")
         .to_rgb8();
     assert_eq!(png.dimensions(), (1280, 720));
-    // Sky above, a meadow below, and hardly a pixel that nothing covers.
+    // The sky is above, a meadow below, and nearly every pixel is covered.
     let mean = |rows: std::ops::Range<u32>, channel: usize| {
         let count = f64::from(1280 * rows.len() as u32);
         let pixels = rows.flat_map(|y| (0..1280).map(move |x| (x, y)));
@@ -365,7 +365,7 @@ fn without_arguments_it_draws_the_garden() {
 #[gaurast_runner::test]
 fn a_scene_is_simulated_from_the_work_that_was_done() {
     let folder = folder();
-    // Three in a row, so that the camera which suits the scene is some way off.
+    // Three Gaussians in a row, so that the default camera is some distance away.
     let last = ONE.lines().last().expect("a Gaussian");
     let others = last.replacen("0 0 3", "2 0 3", 1) + "\n" + &last.replacen("0 0 3", "-2 1 3", 1);
     let three = ONE.replace("vertex 1", "vertex 3") + &others + "\n";
@@ -399,7 +399,7 @@ fn a_scene_is_simulated_from_the_work_that_was_done() {
             .count()
     };
     assert_eq!(spans(false), 6 * 3);
-    // Each tile with something in it is on a module's row, in each frame.
+    // In each frame, each tile that is not empty is on a module's row.
     assert!(spans(true) > 0 && spans(true).is_multiple_of(6));
     let tracks = events.iter().filter(|event| event["ph"] == "M");
     assert!(
@@ -450,7 +450,7 @@ fn a_scene_is_simulated_from_the_work_that_was_done() {
     assert!(compared.contains("+0.000 %"), "{compared}");
     assert!(simulate(&["--what-if"]).contains("blocks saturate"));
     assert!(simulate(&[]).contains("stage 3, raster"));
-    // Only the timeline and the plots were asked for.
+    // Only the timeline and the plots were requested.
     let files = std::fs::read_dir(folder.path()).expect("readable").count();
     assert_eq!(files, 6);
 }
@@ -482,7 +482,7 @@ fn counters_of_a_rendering_and_a_simulation_agree() {
     let output = gaurast(&folder, &rendered);
     assert!(output.status.success());
     let table = String::from_utf8_lossy(&output.stdout).into_owned();
-    // Whole numbers, of which digits stand in groups of three.
+    // Integers are printed in groups of three digits.
     let counter = |name: &str| -> f64 {
         let row = table.lines().find(|line| {
             let mut cells = line.split('┆').map(|cell| cell.trim_matches(['│', ' ']));

@@ -1,5 +1,5 @@
-//! `gaurast` where the system fails it: interrupted, without room, with nobody to read. What was there before stays,
-//! nothing is left half-written, and there is one sentence.
+//! `gaurast` when it is interrupted, the disk is full or the reader is gone. Existing files stay, no incomplete file is
+//! left, and there is one sentence on stderr.
 
 use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
@@ -13,7 +13,7 @@ const SIGINT: i32 = 2;
 fn gaurast(folder: &TempDir, arguments: &[&str]) -> Command {
     let mut command = Command::new("env");
     command
-        // Whoever runs the tests in the background has interrupts ignored, and so would what they start.
+        // A shell that runs tests in the background ignores interrupts, and its children would inherit that.
         .args(["--default-signal=INT", env!("CARGO_BIN_EXE_gaurast")])
         .args(arguments)
         .current_dir(folder)
@@ -30,7 +30,7 @@ fn read(path: &Path) -> Vec<u8> {
     std::fs::read(path).expect("readable")
 }
 
-/// The run failed with exit code 1 and one line that begins with `message`.
+/// Checks that the run failed with exit code 1 and one line that begins with `message`.
 #[track_caller]
 fn failed(output: &Output, message: &str) {
     let stderr = String::from_utf8_lossy(&output.stderr);
@@ -64,7 +64,7 @@ fn an_interrupted_render_leaves_the_picture_that_was_there() {
             "a.exr",
         ];
         let mut child = gaurast(&folder, &arguments).spawn().expect("it starts");
-        // Wherever that meets it, from its first step to its last.
+        // The interrupt comes at any time between the first step and the last.
         std::thread::sleep(Duration::from_millis(step * 90));
         if child.try_wait().expect("its status").is_none() {
             interrupt(&child);
@@ -76,7 +76,7 @@ fn an_interrupted_render_leaves_the_picture_that_was_there() {
             assert_eq!(status.signal(), Some(SIGINT), "{status}");
             interrupted += 1;
             let found = read(&path);
-            // It may have been interrupted after its last step.
+            // The interrupt may have come after the last step.
             assert!(
                 found == old || image::open(&path).is_ok(),
                 "{} bytes",
@@ -107,7 +107,7 @@ fn a_limit_of_file_sizes_is_one_sentence_and_keeps_what_was_there() {
     let path = folder.path().join("a.exr");
     std::fs::write(&path, "an earlier picture").expect("written");
     let command = env!("CARGO_BIN_EXE_gaurast");
-    // In units of half a kibibyte, or one: the picture has three mebibytes.
+    // The unit of the limit is 512 or 1024 bytes; the picture has three MiB.
     let line = format!("ulimit -f 64; exec '{command}' render -q --force --size 500x400 -o a.exr");
     let output = Command::new("sh")
         .args(["-c", &line])

@@ -1,4 +1,4 @@
-//! The `gaurast` command, the renderer, and the C sample.
+//! Tests of the `gaurast` command, the renderer, and the C sample.
 
 mod c_program;
 mod command_line;

@@ -1,4 +1,4 @@
-//! The renderer over many frames, scenes and sizes.
+//! Tests of the renderer over many frames, scenes and sizes.
 
 use gaurast_render::{Frame, RenderError, Renderer};
 use gaurast_scene::camera::Camera;
@@ -33,7 +33,7 @@ fn frames_of_any_size_and_order_are_the_same_pictures() {
             let b = renderer.render(&corner, &camera).expect("a frame");
             assert_eq!((a.picture.width, a.picture.height), (size[0], size[1]));
             assert_eq!(a.picture.pixels.len(), (size[0] * size[1]) as usize);
-            // A query counts its own draw alone.
+            // A query counts only its own draw.
             assert_eq!(counted(&a, "gaussians read"), 4000.0);
             assert_eq!(counted(&b, "gaussians read"), 1000.0);
             pictures.push((a.picture, b.picture));
@@ -44,7 +44,7 @@ fn frames_of_any_size_and_order_are_the_same_pictures() {
     assert_ne!(pictures[0].0, pictures[0].1);
 }
 
-/// Three coefficients that only differ where their degree is drawn.
+/// The drawn degree is the least of the requested and the stored ones; the coefficients show which degree is drawn.
 #[gaurast_runner::test]
 fn the_degree_drawn_is_the_least_of_those_asked_for() {
     let mut renderer = renderer();
@@ -54,7 +54,7 @@ fn the_degree_drawn_is_the_least_of_those_asked_for() {
         opacity: 0.9,
     };
     let mut sh = vec![[0.0; 3]; 25];
-    // Band 1's z and band 2's middle, which peak along +z, where the Gaussian is.
+    // The z function of band 1 and the middle function of band 2, which are greatest along +z, where the Gaussian is.
     sh[2] = [1.0, 0.0, 0.0];
     sh[6] = [0.0, 0.8, 0.0];
     let mut scene = Scene::with_capacity(4, 1);
@@ -173,6 +173,6 @@ fn sizes_beyond_the_device_are_errors() {
         let refused = renderer.render(&uploaded, &camera);
         assert!(matches!(refused, Err(RenderError::Size { .. })), "{size:?}");
     }
-    // The renderer is as good as before.
+    // The renderer still works.
     assert!(renderer.render(&uploaded, &camera([5, 5])).is_ok());
 }

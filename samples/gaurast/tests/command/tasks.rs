@@ -1,4 +1,4 @@
-//! `gaurast` at the tasks that people have: views, folders, ways out, comparing, and what is refused before it costs.
+//! Tests of common tasks with `gaurast`: views, folders, outputs, comparisons, and early errors.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -18,7 +18,7 @@ fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
-/// Runs to success, and returns what is printed.
+/// Runs the command, checks that it succeeds, and returns its output.
 #[track_caller]
 fn succeeds(folder: &TempDir, arguments: &[&str]) -> String {
     let output = gaurast(folder.path(), arguments);
@@ -27,7 +27,7 @@ fn succeeds(folder: &TempDir, arguments: &[&str]) -> String {
     text(&output.stdout)
 }
 
-/// Runs to exit code 1 and one sentence, and leaves nothing.
+/// Runs the command and checks that it fails with exit code 1 and one sentence, and writes no file.
 #[track_caller]
 fn fails(folder: &TempDir, arguments: &[&str], message: &str) {
     let before = files(folder);
@@ -49,7 +49,7 @@ fn files(folder: &TempDir) -> Vec<String> {
     names
 }
 
-/// A PLY file of round Gaussians of this size, at these points, of these colours.
+/// A PLY file of round Gaussians of this size, at these positions, with these colours.
 fn scene(size: f64, gaussians: &[([f64; 3], [f64; 3])]) -> String {
     let mut text = format!(
         "ply\nformat ascii 1.0\nelement vertex {}\n",
@@ -73,7 +73,7 @@ fn scene(size: f64, gaussians: &[([f64; 3], [f64; 3])]) -> String {
 const RED: [f64; 3] = [1.0, 0.0, 0.0];
 const GREEN: [f64; 3] = [0.0, 1.0, 0.0];
 
-/// A folder with a scene of size 1: red in front (at small z), green behind it.
+/// A folder with a scene of size 1: a red Gaussian in front (at small z), a green one behind it.
 fn folder() -> TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     let gaussians = [([0.0, 0.0, -0.5], RED), ([0.0, 0.0, 0.5], GREEN)];
@@ -223,7 +223,7 @@ fn the_drivers_errors_are_told_once_and_count() {
         assert_eq!(stderr.lines().count(), 1, "{stderr}");
         stderr
     };
-    // A trace that does not fit the disk is no success.
+    // A trace that does not fit on the disk is an error.
     let stderr = run("GAURAST_TRACE", "/dev/full");
     assert!(
         stderr.contains("GAURAST_TRACE=/dev/full: No space left"),
@@ -263,7 +263,7 @@ fn sides_distances_and_models() {
     );
     let (parallel, _) = mean(&["--camera", "orthographic"]);
     assert!((parallel / plain - 1.0).abs() < 0.4, "{plain} {parallel}");
-    // A panorama stands in the middle, and sees red and green on either side.
+    // A panorama is taken from the middle, with red and green on opposite sides.
     let (inside, [r, g, _]) = mean(&["--camera", "equirectangular"]);
     assert!(inside > 0.1 && r > 5.0 && g > 5.0, "{inside} {r} {g}");
     let printed = succeeds(
@@ -337,7 +337,7 @@ fn formats_hold_the_same_picture() {
         assert_eq!(picture["equal"], least.is_infinite(), "{name}");
     }
     let depth = exr_depth(&folder.path().join("a.exr"), 64);
-    // The middle of the picture is red's, in front of the scene's middle; a corner has nothing.
+    // The middle of the picture shows red, in front of the scene's middle; a corner is empty.
     let printed = succeeds(&folder, &["two.ply", "--frame", "--size", "64x48"]);
     let keyframe: serde_json::Value = serde_json::from_str(&printed).expect("JSON");
     let vector = |name: &str| -> Vec<f64> {
@@ -374,7 +374,7 @@ fn formats_hold_the_same_picture() {
     assert_eq!(picture.color(), image::ColorType::Rgba8);
     let picture = picture.to_rgba8();
     assert_eq!(picture.get_pixel(0, 0).0, [0, 0, 0, 0]);
-    // Where it is faint, red is as red as where it is not.
+    // Straight alpha: faint red pixels have the same red value as opaque ones.
     let faint = picture
         .pixels()
         .filter(|p| (30..60).contains(&p.0[3]) && p.0[0] > p.0[1]);
@@ -399,7 +399,7 @@ fn formats_hold_the_same_picture() {
     assert_eq!(picture.get_pixel(0, 0).0, [255; 3]);
 }
 
-/// The plane Z of an EXR file.
+/// Reads the plane Z of an EXR file.
 fn exr_depth(path: &Path, width: usize) -> impl Fn(usize, usize) -> f32 + use<> {
     let bytes = std::fs::read(path).expect("readable");
     let text = text(&bytes);
@@ -453,7 +453,7 @@ fn a_video_goes_through_ffmpeg() {
         stderr.contains("a.mp4: videos are made by ffmpeg, and there is none"),
         "{stderr}"
     );
-    // One that keeps what it gets, and what it was told.
+    // A fake encoder that copies its input and notes its arguments.
     let script = "#!/bin/sh\nfor last; do :; done\necho \"$@\" > told\n/bin/cat > \"$last\"\n";
     let program = tools.path().join("ffmpeg");
     std::fs::write(&program, script).expect("written");
@@ -472,7 +472,7 @@ fn a_video_goes_through_ffmpeg() {
         "{told}"
     );
     assert_eq!(files(&folder), ["a.mp4", "told", "two.ply"]);
-    // One that fails: its last line is told, and nothing is left.
+    // A fake encoder that fails: its last line is reported, and no file is left.
     std::fs::write(&program, "#!/bin/sh\necho 'Unknown encoder' >&2\nexit 1\n").expect("written");
     let output = run(&[&video[..], &["--force"]].concat());
     let stderr = text(&output.stderr);
@@ -521,7 +521,7 @@ fn a_training_folder_is_a_scene_with_cameras() {
     assert!(middle[0] > 240 && middle[1] < 20, "{middle:?}");
     assert_eq!(corner, [255; 3]);
     at("out/far.png");
-    // The same, compared with the scene itself.
+    // The same pictures, compared with the scene itself.
     let compared = succeeds(
         &folder,
         &["compare", "out/far.png", "model", "--view", "far", "--json"],
@@ -551,7 +551,7 @@ fn a_training_folder_is_a_scene_with_cameras() {
     assert!(share > 0.02, "{share}");
 }
 
-/// A program that draws a picture of 3x1 pixels by the driver that it is told of: they differ in one channel of one.
+/// A program that draws a picture of 3x1 pixels. Its pictures on the two drivers differ in one channel of one pixel.
 #[cfg(unix)]
 const DRAWS: &str = "case $VK_DRIVER_FILES in *other*) blue=c;; *) blue=b;; esac\nprintf 'P6\\n3 1\\n255\\naaaaa%saaa' $blue";
 
@@ -574,7 +574,7 @@ fn a_programs_pictures_on_two_drivers_are_compared() {
             .collect::<Vec<_>>();
         gaurast(folder.path(), &words)
     };
-    // In a folder of its own for each driver.
+    // The program runs in a folder of its own for each driver.
     let output = compare(&["--json"], &format!("{DRAWS} > a.ppm"), &[]);
     assert!(output.status.success(), "{}", text(&output.stderr));
     let json: serde_json::Value = serde_json::from_str(&text(&output.stdout)).expect("JSON");
@@ -596,7 +596,8 @@ fn a_programs_pictures_on_two_drivers_are_compared() {
         let picture = folder.path().join("compared-drivers").join(source);
         assert_eq!(image::image_dimensions(picture).expect("a picture"), (3, 1));
     }
-    // Where the caller is, told of the folder by an argument; a difference above the limit fails.
+    // The program runs in the caller's folder and gets the picture's folder as an argument. A difference above the
+    // limit fails.
     let script = format!("test -e two.ply && {DRAWS} > $0/a.ppm");
     let allowed = |steps: &str| {
         let more = ["--out", steps, "--fail-above", steps];
@@ -610,7 +611,7 @@ fn a_programs_pictures_on_two_drivers_are_compared() {
         said.contains("1.0 steps of 255, and 0.5 are allowed"),
         "{said}"
     );
-    // A folder that holds something; a program that fails; a driver that isn't there.
+    // A folder that is not empty; a program that fails; a driver that is missing.
     for (output, sentence) in [
         (compare(&[], "true", &[]), "--force writes into it"),
         (

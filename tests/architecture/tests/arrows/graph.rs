@@ -1,4 +1,4 @@
-//! Arrows between modules, and the cycles that they make.
+//! Imports between modules as a graph of arrows, and its cycles.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -6,9 +6,9 @@ use std::fmt;
 /// An import among the children of one module.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Arrow {
-    /// The path of the module whose children these are.
+    /// The path of the parent module of both children.
     pub parent: Vec<String>,
-    /// The child that imports; `mod` is the parent's own file.
+    /// The child that imports; `mod` means the parent's own file.
     pub from: String,
     /// The child that is imported.
     pub to: String,
@@ -26,7 +26,7 @@ impl fmt::Display for Arrow {
     }
 }
 
-/// The arrow that an import from module `from` into module `to` is, among the children of the last module that holds both.
+/// The arrow of an import from module `from` of module `to`, between two children of their last common ancestor.
 pub fn arrow(from: &[String], to: &[String]) -> Option<Arrow> {
     let common = from.iter().zip(to).take_while(|(a, b)| a == b).count();
     if common == from.len() && common == to.len() {
@@ -40,7 +40,7 @@ pub fn arrow(from: &[String], to: &[String]) -> Option<Arrow> {
     })
 }
 
-/// The arrows that are part of some cycle.
+/// The arrows that are part of a cycle.
 pub fn arrows_in_cycles(arrows: &BTreeSet<Arrow>) -> BTreeSet<Arrow> {
     let mut next: BTreeMap<(&[String], &str), BTreeSet<&str>> = BTreeMap::new();
     for arrow in arrows {

@@ -1,5 +1,5 @@
-//! Tests of targets with `harness = false` are registered with the runner: rustc drops a bare `#[test]` there, without a
-//! word.
+//! Checks that tests of targets with `harness = false` are registered with the runner, because rustc silently drops a
+//! plain `#[test]` there.
 
 use std::path::{Path, PathBuf};
 
@@ -7,7 +7,7 @@ use toml::{Table, Value};
 
 use crate::workspace;
 
-/// The files below a folder that end in `.rs`, but for other packages' and `left_out`.
+/// The `.rs` files below a folder, without those of other packages and of `left_out`.
 fn sources(folder: &Path, left_out: &[PathBuf], found: &mut Vec<PathBuf>) {
     for entry in std::fs::read_dir(folder).expect("a folder") {
         let path = entry.expect("an entry").path();
@@ -22,7 +22,7 @@ fn sources(folder: &Path, left_out: &[PathBuf], found: &mut Vec<PathBuf>) {
     }
 }
 
-/// The files of a package's targets that have no harness.
+/// The source files of a package's targets that have no harness.
 fn without_harness(folder: &Path, manifest: &Table) -> Vec<PathBuf> {
     let has_none = |target: &Value| target.get("harness").and_then(Value::as_bool) == Some(false);
     let library = folder.join("src");

@@ -1,14 +1,14 @@
-//! Packages depend on each other as ARCHITECTURE.md says.
+//! Checks that packages depend on each other as ARCHITECTURE.md says.
 //!
-//! `api` <- `driver` <- `samples` <- `tests`, and `simdevice` <- `driver`. Nothing outside `tests` depends on what lies
-//! there, but for tests on the runner of tests.
+//! `api` <- `driver` <- `samples` <- `tests`, and `simdevice` <- `driver`. Nothing outside `tests` depends on packages
+//! in `tests`, except that unit tests use the test runner.
 
 use crate::workspace::{self, Dependency};
 
-/// The folder of the runner of tests.
+/// The folder of the test runner.
 const RUNNER: &str = "tests/runner";
 
-/// The packages that a folder's may depend on, by what their folders begin with. The first row that fits counts.
+/// The folders on which packages of a folder may depend. Folders match by prefix, and the first matching row counts.
 const LAYERS: &[(&str, &[&str])] = &[
     ("api", &["api"]),
     ("simdevice/devmem", &[]),
@@ -28,20 +28,20 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("tests", &["api", "driver", "simdevice", "tests"]),
 ];
 
-/// The packages that a folder's tests may depend on beside these.
+/// The additional folders on which tests of a folder may depend.
 const TESTS: &[(&str, &[&str])] = &[
     ("api/render", &["driver"]),
     ("driver/spirv", &["simdevice/devmem"]),
 ];
 
-/// A folder is `of`, or lies in it.
+/// Returns true if `folder` is `of` or is inside it.
 fn is_in(folder: &str, of: &str) -> bool {
     folder
         .strip_prefix(of)
         .is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
 }
 
-/// The folders of a table's first row that fits.
+/// The allowed folders in a table's first matching row.
 fn allowed(table: &[(&str, &'static [&'static str])], from: &str) -> &'static [&'static str] {
     let row = table.iter().find(|(folder, _)| is_in(from, folder));
     row.map_or(&[], |(_, folders)| folders)
@@ -50,7 +50,7 @@ fn allowed(table: &[(&str, &'static [&'static str])], from: &str) -> &'static [&
 fn is_allowed(dependency: &Dependency) -> bool {
     let Dependency { from, to, is_dev } = dependency;
     let is_one_of = |folders: &[&str]| folders.iter().any(|folder| is_in(to, folder));
-    // Nothing depends on what only writes files.
+    // Nothing may depend on a package that only generates files.
     to != "driver/gen" && is_one_of(allowed(LAYERS, from))
         || *is_dev && (to == RUNNER || is_one_of(allowed(TESTS, from)))
 }

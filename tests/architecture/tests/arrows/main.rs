@@ -1,10 +1,10 @@
-//! The modules of a crate import each other one way: no cycle stands among the children of any module, in no crate of the
-//! workspace. Packages depend on each other as the layers say.
+//! Checks that the modules of each crate of the workspace have no import cycles: there is no cycle between the children
+//! of any module. Packages depend on each other as the layers say.
 //!
-//! All paths in the sources count (imports, expressions, types, macros' arguments), but for those of tests within a crate.
-//! An `impl` outside its type's module is an arrow back from that module, since whoever reads the type must go there;
-//! but for types in generated files, which can hold nothing by hand.
-//! `known.txt` lists the crates whose cycles are there still. It only shrinks: a crate without one must leave it.
+//! All paths in the sources count (imports, expressions, types, macro arguments), except those of tests within a crate.
+//! An `impl` outside the module of its type counts as an arrow from the type's module to that of the `impl`, since
+//! readers of the type must go there. Types in generated files are exempt, because those files cannot hold handwritten
+//! code. `known.txt` lists the crates that still have cycles. A crate without cycles must not be listed.
 
 mod graph;
 mod harness;
@@ -35,7 +35,7 @@ fn names() -> Vec<Variant> {
     targets.map(|target| Variant::new(target.name)).collect()
 }
 
-/// The crates that have cycles still.
+/// The crates that still have cycles.
 fn known() -> impl Iterator<Item = &'static str> {
     let lines = include_str!("known.txt").lines();
     lines.filter(|line| !line.starts_with('#'))

@@ -1,4 +1,4 @@
-//! A crate's modules, read from its sources: what each defines, imports and names.
+//! The modules of a crate, read from its sources: the items, imports and paths of each.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -9,14 +9,14 @@ use syn::{Attribute, Item, Meta, UseTree};
 
 use crate::graph::{self, Arrow};
 
-/// A path as the source has it, by its segments.
+/// A path in the source, as its segments.
 type Segments = Vec<String>;
 
 /// An import.
 #[derive(Debug)]
 struct Import {
     path: Segments,
-    /// The name that it is known by here; none for all names.
+    /// The local name of the import; `None` for a glob import.
     name: Option<String>,
 }
 
@@ -25,14 +25,14 @@ struct Import {
 struct Module {
     /// Its path, the crate's name first.
     path: Segments,
-    /// The names of its items, but for modules.
+    /// The names of its items, without modules.
     items: BTreeSet<String>,
     imports: Vec<Import>,
-    /// The paths that its code names.
+    /// The paths that occur in its code.
     paths: BTreeSet<Segments>,
-    /// The types that it has an `impl` of, and the trait if it is one of a trait.
+    /// The types for which it has an `impl`, each with the trait if there is one.
     impls: Vec<(Segments, Option<Segments>)>,
-    /// A program wrote its file.
+    /// True if its file is generated.
     is_generated: bool,
 }
 
@@ -43,7 +43,7 @@ pub struct Crate {
 }
 
 impl Crate {
-    /// Reads a crate from its root's file.
+    /// Reads a crate from the file of its root module.
     pub fn read(name: &str, root: &Path) -> Self {
         let mut found = Self {
             modules: BTreeMap::new(),
@@ -53,7 +53,7 @@ impl Crate {
         found
     }
 
-    /// Reads a module's file, whose children's files lie in `folder`.
+    /// Reads the file of a module; the files of its children are in `folder`.
     fn read_file(&mut self, path: Segments, file: &Path, folder: &Path) {
         let text = std::fs::read_to_string(file)
             .unwrap_or_else(|error| panic!("{}: {error}", file.display()));
@@ -84,7 +84,7 @@ impl Crate {
         for child in children {
             let name = child.ident.to_string();
             let child_path = [path.clone(), vec![name.clone()]].concat();
-            // The file that a `path` attribute names, from the folder of the module's own.
+            // The file of a `path` attribute is relative to the folder of the module's own file.
             if let Some(file) = named_file(&child.attrs) {
                 let file = folder.join(file);
                 let child_folder = file.parent().expect("a folder").to_owned();
@@ -121,7 +121,7 @@ impl Crate {
                 let Some(of) = self.definition(module, of) else {
                     continue;
                 };
-                // A trait's own module may say what it is for every type.
+                // A trait's own module may implement it for every type.
                 if by.as_ref() != Some(&module.path) && !self.modules[&of].is_generated {
                     arrows.extend(graph::arrow(&of, &module.path));
                 }
@@ -130,13 +130,13 @@ impl Crate {
         arrows
     }
 
-    /// The module that defines what `path` names in `module`, if it is one of this crate.
+    /// The module that defines the item that `path` names in `module`, if it is in this crate.
     fn definition(&self, module: &Module, path: &[String]) -> Option<Segments> {
         let absolute = self.absolute(module, path, 0)?;
         self.follow(&absolute, 0)
     }
 
-    /// `path` from the crate's root, if it leads there.
+    /// The absolute form of `path` from the crate's root, if it is in this crate.
     fn absolute(&self, module: &Module, path: &[String], depth: usize) -> Option<Segments> {
         let (first, rest) = path.split_first()?;
         let root = &module.path[..1];
@@ -160,7 +160,7 @@ impl Crate {
         if module.items.contains(first) || self.modules.contains_key(&child) {
             return Some([&module.path, path].concat());
         }
-        // Imports of imports end, since no sources import in circles.
+        // Chains of imports are finite in valid sources; the limit stops this search otherwise.
         if depth > 8 {
             return None;
         }
@@ -185,7 +185,7 @@ impl Crate {
             .next()
     }
 
-    /// Reports whether a name is known in a module.
+    /// Returns true if a name is defined or imported in a module.
     fn has(&self, module: &Module, name: &String) -> bool {
         let child = [module.path.clone(), vec![name.clone()]].concat();
         module.items.contains(name)
@@ -196,7 +196,7 @@ impl Crate {
                 .any(|import| import.name.as_ref() == Some(name))
     }
 
-    /// The module that defines what an absolute path names, through modules that export it again.
+    /// The module that defines the item of an absolute path; re-exports are followed.
     fn follow(&self, path: &[String], depth: usize) -> Option<Segments> {
         let mut length = 1;
         while length < path.len() && self.modules.contains_key(&path[..=length]) {
@@ -211,7 +211,7 @@ impl Crate {
         }
         match self.absolute(module, &path[length..], 0) {
             Some(further) if further != path => self.follow(&further, depth + 1),
-            // What another crate defines, or a macro.
+            // An item of another crate, or a macro.
             _ if module
                 .imports
                 .iter()
@@ -224,7 +224,7 @@ impl Crate {
     }
 }
 
-/// Collects what a module's items define and name.
+/// A visitor that collects the items and the paths of a module.
 struct Collector<'a> {
     module: &'a mut Module,
 }
@@ -238,7 +238,7 @@ impl Collector<'_> {
             }
             UseTree::Name(tree) => {
                 let name = tree.ident.to_string();
-                // `a::{self}` is `a`.
+                // `a::{self}` means `a`.
                 let name = if name == "self" {
                     path.last().cloned().unwrap_or_default()
                 } else {
@@ -361,10 +361,10 @@ impl<'ast> Visit<'ast> for Collector<'_> {
         self.tokens(call.tokens.clone());
     }
 
-    // `pub(crate)` says who may come here, not who is gone to.
+    // A visibility such as `pub(crate)` is not an import.
     fn visit_visibility(&mut self, _: &'ast syn::Visibility) {}
 
-    // Attributes name no modules.
+    // Attributes name no modules of the crate.
     fn visit_attribute(&mut self, _: &'ast Attribute) {}
 }
 
@@ -408,7 +408,7 @@ fn named_file(attributes: &[Attribute]) -> Option<String> {
         })
 }
 
-/// Reports whether an item is there for tests only.
+/// Returns true if an item exists only in tests.
 fn is_test(attributes: &[Attribute]) -> bool {
     attributes.iter().any(|attribute| match &attribute.meta {
         Meta::List(list) if list.path.is_ident("cfg") => {

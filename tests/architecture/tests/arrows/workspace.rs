@@ -1,4 +1,4 @@
-//! The workspace as its manifests describe it: packages, their targets and what they depend on.
+//! The workspace as its manifests describe it: packages, their targets and their dependencies.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -14,7 +14,7 @@ pub fn root() -> PathBuf {
 #[derive(Debug)]
 pub struct Package {
     pub name: String,
-    /// Its folder, from the root.
+    /// Its folder, relative to the root.
     pub folder: String,
     pub manifest: Table,
 }
@@ -26,7 +26,7 @@ pub struct Dependency {
     pub from: String,
     /// The folder of the package that it depends on.
     pub to: String,
-    /// It is for tests, examples and benchmarks only.
+    /// True if it is only for tests, examples and benchmarks.
     pub is_dev: bool,
 }
 
@@ -74,7 +74,7 @@ pub fn dependencies() -> Vec<Dependency> {
             for kind in ["dependencies", "dev-dependencies", "build-dependencies"] {
                 let listed = table.get(kind).and_then(Value::as_table);
                 for (key, value) in listed.into_iter().flatten() {
-                    // A dependency may be renamed.
+                    // A dependency may have another name than its package.
                     let name = value.get("package").and_then(Value::as_str).unwrap_or(key);
                     if let Some(to) = folders.get(name) {
                         found.push(Dependency {
@@ -90,7 +90,7 @@ pub fn dependencies() -> Vec<Dependency> {
     found
 }
 
-/// A crate that is built: a library, a program, an example, a benchmark or a file of tests.
+/// A crate that cargo builds: a library, a program, an example, a benchmark or a test executable.
 #[derive(Clone, Debug)]
 pub struct Target {
     /// The package's name, and the target's unless it is the library.
@@ -100,7 +100,7 @@ pub struct Target {
 }
 
 impl Package {
-    /// The crates that are built of it.
+    /// The crates that cargo builds from it.
     pub fn targets(&self) -> Vec<Target> {
         let folder = root().join(&self.folder);
         let mut found: BTreeMap<PathBuf, String> = BTreeMap::new();
@@ -147,7 +147,8 @@ impl Package {
         format!("{}/{stem}", self.name)
     }
 
-    /// A file of a folder that is no place of cargo's own: the package of all tests has its folder there.
+    /// Returns true if the file is next to a manifest. The package of all tests has its root in the folder where cargo
+    /// looks for tests.
     fn is_part_of_a_folder(&self, path: &Path) -> bool {
         let parent = path.parent().expect("a folder");
         parent.join("Cargo.toml").exists()

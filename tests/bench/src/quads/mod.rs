@@ -1,9 +1,9 @@
-//! Gaussians as blended quads: how a Vulkan application draws them on a device that has only triangles, a software one
-//! for example. It is what [`Renderer`](gaurast_render::Renderer) is measured against.
+//! Gaussians as blended quads, as a Vulkan application draws them on a device that has only triangles, for example a
+//! software device. Benchmarks compare [`Renderer`](gaurast_render::Renderer) with it.
 //!
-//! Each frame, the processor projects the Gaussians that may be seen, sorts them by depth and writes them to a buffer;
-//! the device draws an oriented quad for each, as far as its alpha reaches the floor, from the back to the front.
-//! Projection is in binary32; nothing ends early where a pixel is saturated.
+//! In each frame, the processor projects the Gaussians that may be visible, sorts them by depth and writes them to a
+//! buffer. The device draws an oriented quad for each, from back to front. A quad ends where alpha reaches its floor.
+//! Projection is in binary32. Saturated pixels are still blended.
 
 mod pipeline;
 mod project;
@@ -34,13 +34,13 @@ const CHUNK: usize = 4096;
 const CORNERS: u32 = 4;
 const QUAD: [u32; 6] = [0, 1, 2, 2, 1, 3];
 
-/// Why quads could not be drawn.
+/// A failure of drawing quads.
 #[derive(Debug, Error)]
 pub enum QuadError {
     /// The device failed, or there is none.
     #[error(transparent)]
     Render(#[from] RenderError),
-    /// The Vulkan loader is not there.
+    /// The Vulkan loader is missing.
     #[error("there is no Vulkan loader: {0}")]
     NoLoader(String),
     /// Threads could not be started.
@@ -59,15 +59,15 @@ pub struct QuadRenderer {
     device: Arc<Device>,
 }
 
-/// Room for a number of quads.
+/// Buffers for a number of quads.
 struct Buffers {
     splats: Buffer,
     indices: Buffer,
 }
 
 impl QuadRenderer {
-    /// A renderer on the first device of `entry` whose name holds `device_name`. `threads` share
-    /// the projection, 0 for one for each processor.
+    /// A renderer on the first device of `entry` whose name contains `device_name`. The projection uses `threads`
+    /// threads; 0 means one for each processor.
     ///
     /// # Errors
     /// If there is no such device, or Vulkan fails.
@@ -86,7 +86,7 @@ impl QuadRenderer {
         })
     }
 
-    /// As [`QuadRenderer::new`], on a device of the system's Vulkan loader.
+    /// A renderer as [`QuadRenderer::new`] makes it, on a device of the system's Vulkan loader.
     ///
     /// # Errors
     /// If there is no loader, no such device, or Vulkan fails.
@@ -102,10 +102,10 @@ impl QuadRenderer {
         self.device.name()
     }
 
-    /// Draws `scene` as `camera` sees it, with colours of degree `sh_degree` at most (and 3), where
-    /// alpha is at least `alpha_floor` (1/255 in 3DGS).
+    /// Draws `scene` as `camera` sees it, with colours of degree `sh_degree` at most (and 3), where alpha is at least
+    /// `alpha_floor` (1/255 in 3DGS).
     ///
-    /// The frame's counters tell the times of its steps; its time is their sum.
+    /// The frame's counters are the times of its steps; the frame's time is their sum.
     ///
     /// # Errors
     /// If the picture's size is not within the device's limits, or Vulkan fails.
@@ -131,7 +131,7 @@ impl QuadRenderer {
         })
     }
 
-    /// Does what the processor has to do for [`QuadRenderer::render`]: the quads lie in the buffers, in their order.
+    /// Does the processor's part of [`QuadRenderer::render`]: the sorted quads are in the buffers afterwards.
     ///
     /// # Errors
     /// As [`QuadRenderer::render`].
@@ -157,7 +157,7 @@ impl QuadRenderer {
 
         let [pairs, scratch] = &mut self.pairs;
         pairs.clear();
-        // From back to front; depths are positive, so that their bits are in their order.
+        // From back to front. Depths are positive, so their bits sort as the depths do.
         pairs.extend(
             splats
                 .iter()
@@ -202,7 +202,7 @@ impl QuadRenderer {
     }
 }
 
-/// Quads in their buffers, which can be drawn again and again.
+/// Quads in buffers, which can be drawn any number of times.
 pub struct Prepared<'a> {
     count: u32,
     push: Push,
@@ -252,7 +252,7 @@ impl Prepared<'_> {
     }
 }
 
-/// What may be seen, in the scene's order.
+/// The Gaussians that may be visible, in the scene's order.
 fn project_all(projection: &Projection, scene: &Scene) -> Vec<(f32, Splat)> {
     let chunks: Vec<Vec<(f32, Splat)>> = (0..scene.len().div_ceil(CHUNK))
         .into_par_iter()
@@ -297,7 +297,7 @@ impl Steps {
 }
 
 impl Buffers {
-    /// Room for `count` quads and some more, since the camera moves.
+    /// Buffers for `count` quads and a reserve, since the camera moves.
     fn new(device: &Arc<Device>, count: usize) -> Result<Self, RenderError> {
         use vk::BufferUsageFlags as Usage;
         let capacity = (count + count / 4).max(1024) as u32;
@@ -318,7 +318,7 @@ impl Buffers {
     }
 }
 
-/// Clears the target to nothing and draws that many quads into it.
+/// Clears the target to zero and draws the first quads into it.
 fn record_draw(
     device: &Device,
     pipeline: &QuadPipeline,

@@ -1,4 +1,4 @@
-//! The pipeline that blends quads from back to front, and the buffer that it pulls them from.
+//! The pipeline that blends quads from back to front, and the buffer from which it reads them.
 
 use std::sync::Arc;
 
@@ -8,10 +8,10 @@ use gaurast_render::device::Device;
 use gaurast_render::resource::Buffer;
 use gaurast_render::{COLOR_FORMAT, During, RenderError};
 
-/// What the shaders are pushed: a pixel in normalised device coordinates, and the alpha floor.
+/// The push constants: the size of a pixel in normalised device coordinates, and the alpha floor.
 pub(super) type Push = [f32; 3];
 
-/// Who sees it.
+/// The stages that read the push constants.
 const STAGES: vk::ShaderStageFlags = vk::ShaderStageFlags::from_raw(
     vk::ShaderStageFlags::VERTEX.as_raw() | vk::ShaderStageFlags::FRAGMENT.as_raw(),
 );
@@ -87,7 +87,7 @@ impl QuadPipeline {
         let allocate_info = vk::DescriptorSetAllocateInfo::default()
             .descriptor_pool(self.pool)
             .set_layouts(&layouts);
-        // SAFETY: the structure is valid, and the pool has room for the set.
+        // SAFETY: the structure is valid, and the pool is large enough for the set.
         let sets = unsafe { raw.allocate_descriptor_sets(&allocate_info) }
             .during("vkAllocateDescriptorSets")?;
         self.set = sets[0];
@@ -163,7 +163,7 @@ impl QuadPipeline {
         Ok(())
     }
 
-    /// Pulls quads from `buffer` from now on. No submission may be pending.
+    /// Reads quads from `buffer` from now on. No submission may be pending.
     pub(super) fn pull_from(&self, buffer: &Buffer) {
         let info = [vk::DescriptorBufferInfo {
             buffer: buffer.handle(),
@@ -178,7 +178,7 @@ impl QuadPipeline {
         unsafe { self.device.raw().update_descriptor_sets(&[write], &[]) };
     }
 
-    /// Records everything that a draw needs but vertices, viewport and scissor.
+    /// Binds the pipeline and its descriptor set, and sets the push constants.
     pub(super) fn bind(&self, commands: vk::CommandBuffer, push: &Push) {
         let (raw, graphics) = (self.device.raw(), vk::PipelineBindPoint::GRAPHICS);
         // SAFETY: the command buffer is recording, and everything is of the same device.

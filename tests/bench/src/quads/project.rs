@@ -6,7 +6,7 @@ use glam::{Mat3, Quat, Vec2, Vec3};
 use gaurast_scene::Scene;
 use gaurast_scene::camera::Camera;
 
-/// The most spherical harmonics that are evaluated: degree 3.
+/// The number of spherical harmonics that are evaluated at most: degree 3.
 const COEFFICIENTS: usize = 16;
 
 /// Variance that is added on the screen, in px^2.
@@ -27,14 +27,14 @@ pub(super) struct Splat {
     color: [f32; 4],
 }
 
-/// A camera made ready for many Gaussians.
+/// A camera with precomputed values for many Gaussians.
 pub(super) struct Projection {
     rotation: Mat3,
     eye: Vec3,
     focal: Vec2,
     principal: Vec2,
     size: Vec2,
-    /// Least and greatest slopes at which the Jacobian is taken.
+    /// Least and greatest slopes to which the Jacobian's point is clamped.
     slopes: [Vec2; 2],
     alpha_floor: f32,
     coefficients: usize,
@@ -62,21 +62,21 @@ impl Projection {
         }
     }
 
-    /// Gaussian `index` of `scene` on the screen and its depth, if it may be seen.
+    /// Gaussian `index` of `scene` on the screen and its depth, or `None` if it is not visible.
     pub(super) fn splat(&self, scene: &Scene, index: usize) -> Option<(f32, Splat)> {
         let shape = &scene.shapes()[index];
         let position = Vec3::from_array(scene.positions()[index]);
         let view = self.rotation * (position - self.eye);
-        // So written, both are false for a NaN.
+        // Written like this, the condition also rejects NaN.
         if !(view.z > NEAR && shape.opacity >= self.alpha_floor) {
             return None;
         }
         let slope = view.truncate() / view.z;
         let mean = self.focal * slope + self.principal;
-        // Where alpha reaches its floor, in standard deviations.
+        // The square of the distance at which alpha reaches its floor, in standard deviations.
         let reach = 2.0 * (shape.opacity / self.alpha_floor).ln();
         let radius = reach.sqrt();
-        // No Gaussian reaches further than its longest axis seen from its place.
+        // The greatest reach is along the longest axis, enlarged by the slope of the view.
         let longest = Vec3::from_array(shape.scale).max_element();
         let bound = radius
             * (longest / view.z * self.focal.max_element() * (1.0 + self.widest_slope())
@@ -146,17 +146,17 @@ impl Projection {
     }
 }
 
-/// The standard deviations along the ellipse's axes, unless it is none.
+/// The standard deviations along the ellipse's axes, or `None` if the covariance has no ellipse.
 fn axes(xx: f32, xy: f32, yy: f32) -> Option<(Vec2, Vec2)> {
     let (middle, half) = ((xx + yy) / 2.0, (xx - yy) / 2.0);
     let spread = half.hypot(xy);
     let greatest = middle + spread;
-    // The determinant by the greatest eigenvalue, which cancels less than their difference.
+    // The least eigenvalue from the determinant and the greatest one: this cancels less than a difference.
     let least = (xx * yy - xy * xy) / greatest;
     if !(least > 0.0 && greatest.is_finite()) {
         return None;
     }
-    // Of the two rows that the axis is perpendicular to, the longer.
+    // The longer of the two rows to which the axis is perpendicular.
     let direction = if half >= 0.0 {
         Vec2::new(half + spread, xy)
     } else {

@@ -1,9 +1,9 @@
-//! A radix sort of (key, name) pairs.
+//! A radix sort of (key, index) pairs.
 
 /// Bits of a digit.
 const BITS: u32 = 11;
 
-/// Sorts `pairs` by their keys, ascending and stably; `scratch` is used for nothing else.
+/// Sorts `pairs` by their keys, ascending and stably. `scratch` is working memory.
 pub(super) fn sort(pairs: &mut Vec<(u32, u32)>, scratch: &mut Vec<(u32, u32)>) {
     let differing = pairs
         .iter()

@@ -1,4 +1,4 @@
-//! The command line, as a user meets it.
+//! Tests of the command line.
 
 use std::process::{Command, Output};
 
@@ -12,8 +12,8 @@ fn bench(folder: &TempDir, arguments: &[&str]) -> Output {
         .expect("the program runs")
 }
 
-/// Benchmarks a small scene; the files are left in `folder`. Returns the table, the numbers as JSON, and the number of
-/// frames of each contender that the CSV file has.
+/// Benchmarks a small scene and leaves the files in `folder`. Returns the table, the numbers as JSON, and a function
+/// that counts the frames of a contender in the CSV file.
 fn benchmark(folder: &TempDir) -> (String, serde_json::Value, impl Fn(&str) -> usize) {
     let arguments = [
         "frames",
@@ -51,7 +51,7 @@ fn frames_are_benchmarked_and_held_against_the_oracle() {
     for part in ["synthetic 300", "quads on gaurast", "raster", "project"] {
         assert!(text.contains(part), "{part}: {text}");
     }
-    // The first, and two more.
+    // The first frame and two more.
     assert_eq!(["gaurast", "quads on gaurast"].map(frames), [3, 3]);
     let series = json["scenes"][0]["series"].as_array().expect("series");
     let error = |contender: &str| {
@@ -61,7 +61,7 @@ fn frames_are_benchmarked_and_held_against_the_oracle() {
         of.expect("measured")["error"].clone()
     };
     let max = error("Gaurast")["max"].as_f64().expect("a number");
-    // A Gaussian that counts or not at the floor of alpha makes this much.
+    // A Gaussian at the alpha floor may contribute or not, which makes this difference.
     assert!(max < 2.0 / 255.0, "{max}");
     let psnr = error("QuadsOnGaurast")["psnr"].as_f64().expect("a number");
     assert!(psnr > 40.0, "{psnr}");

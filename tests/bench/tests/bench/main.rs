@@ -1,4 +1,4 @@
-//! The benchmarks' program, and the quads that it measures against.
+//! Tests of the benchmark program, and of the quads with which it compares.
 
 mod command_line;
 mod quads;

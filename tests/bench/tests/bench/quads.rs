@@ -1,4 +1,4 @@
-//! Quads on any device show what the Gaussian topology draws.
+//! Quads on any device give the picture of the Gaussian topology.
 
 use gaurast_bench::quads::QuadRenderer;
 use gaurast_oracle::compare::Statistics;
@@ -30,11 +30,11 @@ fn meant(scene: &Scene, camera: &Camera) -> Picture {
     renderer.render(&scene, camera).expect("a frame").picture
 }
 
-/// Every pixel counts; what remains are binary32 and contributions behind saturated pixels.
+/// Compares every pixel. The remaining differences come from binary32 and from contributions behind saturated pixels.
 fn compare(quads: &mut QuadRenderer) {
     for (scene, camera) in scenes() {
         let expected = meant(&scene, &camera);
-        // Twice: the second frame finds buffers of another size in place.
+        // The first size is smaller, so that the second frame replaces the buffers.
         for camera in [camera.resized([64, 64]), camera] {
             let drawn = quads.render(&scene, &camera, 3, ALPHA_FLOOR);
             let drawn = drawn.expect("a frame").picture;

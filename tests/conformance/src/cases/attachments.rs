@@ -24,7 +24,7 @@ const FORMATS: [(&str, vk::Format); 3] = [
     ("d32", vk::Format::D32_SFLOAT),
 ];
 
-/// Depth coefficients that take 1 to 0 and 16 to 1, or the reverse.
+/// Depth coefficients that map a depth variable of 1 to depth 0 and 16 to depth 1, or the reverse.
 fn coefficients(reverse: bool) -> [f32; 2] {
     if reverse {
         [-1.0 / 15.0, 16.0 / 15.0]
@@ -113,7 +113,7 @@ pub(super) fn depth(chapter: &mut Chapter<'_>) {
         chapter.add(format!("through.{name}"), move || {
             let mut draw = with_depth(tested(vk::Format::D32_SFLOAT, vk::CompareOp::LESS, true))
                 .seen_by(camera.depth_coefficients(coefficients));
-            // Stored depths are those of these depth variables.
+            // The stored depths correspond to these depth variables.
             draw.depth.as_mut().expect("a depth").stripes = [1.0, 2.0, 3.0, 4.0, 6.0, 15.0];
             draw
         });
@@ -259,7 +259,7 @@ pub(super) fn interactions(chapter: &mut Chapter<'_>) {
         ("add", Blend::Add),
         ("under", Blend::Under),
     ];
-    // All formats hold these, or nearly.
+    // All formats can hold these values, at least nearly.
     let behind = [0.2, 0.4, 0.6, 0.8];
     for (format_name, format) in formats {
         for (blend_name, blend) in blends {
@@ -301,7 +301,7 @@ pub(super) fn interactions(chapter: &mut Chapter<'_>) {
             });
         }
     }
-    // The oracle has no fractions of pixels: no slope of this scene is clamped.
+    // The oracle has no fractional viewports, so no slope of this scene may be clamped.
     let wide = front()
         .focal_length([35.0; 2])
         .principal_point([30.5, 23.5]);
@@ -348,7 +348,7 @@ pub(super) fn interactions(chapter: &mut Chapter<'_>) {
             ..Draw::new(dense(45, 0))
         });
     }
-    // Two sets over each other, against one.
+    // Two sets over each other, and the same draws as one set.
     for merges in [false, true] {
         for (format_name, format) in formats {
             let name = if merges { "one_set" } else { "two_sets" };

@@ -1,4 +1,4 @@
-//! A case, and the chapter that it is written in.
+//! A case, and the chapter to which it belongs.
 
 use crate::draw::Draw;
 
@@ -6,31 +6,31 @@ use crate::draw::Draw;
 pub struct Case {
     /// The chapter, a word.
     pub chapter: &'static str,
-    /// The name within the chapter: words and their values, with full stops between.
+    /// The name within the chapter: words and their values, separated by full stops.
     pub name: String,
     make: Box<dyn Fn() -> Draw + Send + Sync>,
 }
 
 impl Case {
-    /// Chapter and name.
+    /// The chapter and the name.
     pub fn path(&self) -> String {
         format!("{}.{}", self.chapter, self.name)
     }
 
-    /// The draw, which is made anew each time.
+    /// Makes the draw; each call makes a new one.
     pub fn draw(&self) -> Draw {
         (self.make)()
     }
 }
 
-/// A chapter that is being written.
+/// A chapter under construction.
 pub(super) struct Chapter<'a> {
     name: &'static str,
     cases: &'a mut Vec<Case>,
 }
 
 impl<'a> Chapter<'a> {
-    /// A chapter whose cases go behind others.
+    /// A chapter whose cases are appended to `cases`.
     pub(super) fn new(name: &'static str, cases: &'a mut Vec<Case>) -> Self {
         Self { name, cases }
     }

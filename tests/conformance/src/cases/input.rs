@@ -1,4 +1,4 @@
-//! What is drawn: commands and sets, attributes and what is skipped, model matrices.
+//! Input of draws: commands and sets, attributes and skipped Gaussians, model matrices.
 
 use ash::vk;
 use gaurast::vk::{GaussianLinearizationGAURAST as Linearization, GaussianOrderGAURAST as Order};
@@ -87,7 +87,7 @@ pub(super) fn topology(chapter: &mut Chapter<'_>) {
     }
 }
 
-/// Changes one attribute of a Gaussian.
+/// A function that changes one attribute of a Gaussian.
 type Change = fn(&mut SceneBuffers, usize, f32);
 
 pub(super) fn attributes(chapter: &mut Chapter<'_>) {
@@ -142,7 +142,7 @@ pub(super) fn attributes(chapter: &mut Chapter<'_>) {
     ] {
         changed(format!("opacity_{name}"), fade, value);
     }
-    // With a ceiling at the floor, opacities there count as they are.
+    // An opacity equal to the floor is not below it.
     chapter.add("opacity_at_floor", move || {
         Draw::new(many(1, |_| Gaussian {
             opacity: 0.25,
@@ -272,7 +272,7 @@ pub(super) fn instances(chapter: &mut Chapter<'_>) {
     }
 }
 
-/// A few Gaussians, once for each of some placements, or placed each its own way.
+/// A few Gaussians, each at all placements, or each at its own placement.
 fn placed(rate: vk::VertexInputRate, placements: Vec<OracleInstance>, degree: u32) -> Draw {
     let mut scene = cloud(25, 90, degree);
     scene
@@ -303,7 +303,7 @@ fn placed(rate: vk::VertexInputRate, placements: Vec<OracleInstance>, degree: u3
     }
 }
 
-/// Matrices that turn, stretch, shear, mirror and move.
+/// Matrices that rotate, stretch, shear, mirror and translate.
 fn placements() -> Vec<OracleInstance> {
     (0..6)
         .map(|at| {

@@ -1,4 +1,4 @@
-//! The cases, chapter by chapter, each made from a table.
+//! The cases of all chapters, made from tables.
 
 mod attachments;
 mod chapter;
@@ -12,7 +12,7 @@ use chapter::Chapter;
 
 type Write = fn(&mut Chapter<'_>);
 
-/// The chapters in their order.
+/// The chapters in order.
 const CHAPTERS: [(&str, Write); 15] = [
     ("topology", input::topology),
     ("attributes", input::attributes),
@@ -31,7 +31,7 @@ const CHAPTERS: [(&str, Write); 15] = [
     ("numerics", numerics::numerics),
 ];
 
-/// Names of the chapters.
+/// The names of the chapters.
 pub fn chapters() -> impl Iterator<Item = &'static str> {
     CHAPTERS.iter().map(|(name, _)| *name)
 }
@@ -45,7 +45,8 @@ pub fn all() -> Vec<Case> {
     cases
 }
 
-/// Reports whether a path fits a pattern, in which `*` stands for anything; a pattern without one need only be contained.
+/// Returns true if a path matches a pattern, in which `*` stands for any text. A pattern without `*` must be a part of
+/// the path.
 pub fn fits(path: &str, pattern: &str) -> bool {
     let Some((first, rest)) = pattern.split_once('*') else {
         return path.contains(pattern);

@@ -1,4 +1,5 @@
-//! Cameras, orders, geometry, projection, the state's numbers, harmonics, binary16, approximations.
+//! Modes of the pipeline: cameras, orders, geometry, projection, the state's numbers, harmonics, binary16,
+//! approximations.
 
 use gaurast::vk::{
     GaussianAntialiasingGAURAST as Antialiasing, GaussianCameraModelGAURAST as Model,
@@ -44,7 +45,7 @@ pub(super) fn camera(chapter: &mut Chapter<'_>) {
             ..Draw::new(dense(3, 2)).seen_by(camera)
         });
     }
-    // Centres that lie in the planes are not between them; their neighbours are.
+    // Centres in the planes are not between them; their neighbours are.
     let in_planes = || {
         many(6, |index| {
             let z = [2.0, 2.0_f32.next_up(), 3.0, 5.0_f32.next_down(), 5.0, 6.0][index];
@@ -65,7 +66,7 @@ pub(super) fn camera(chapter: &mut Chapter<'_>) {
             Draw::new(in_planes()).seen_by(camera)
         });
     }
-    // Beside the picture the Jacobian is taken at a clamped slope.
+    // Outside the picture the Jacobian uses a clamped slope.
     for (name, by) in [
         ("left", [-1.0, 0.0]),
         ("right", [1.0, 0.0]),
@@ -95,7 +96,7 @@ pub(super) fn order(chapter: &mut Chapter<'_>) {
             }
         }
     }
-    // Along the camera's axis all are within a quarter of a unit in the last place of the same depth.
+    // Along the camera's axis all depths are equal to within a quarter of a unit in the last place.
     let tilt = 1e-7;
     let tilted = front().rotation([1.0, 0.0, -tilt, 0.0, 1.0, 0.0, tilt, 0.0, 1.0]);
     chapter.add("ties.equal_when_rounded", move || {
@@ -110,7 +111,7 @@ pub(super) fn order(chapter: &mut Chapter<'_>) {
     });
     chapter.add("ties.neighbours_differ", || {
         Draw::new(many(64, |index| Gaussian {
-            // In the reverse order of the draw, a unit in the last place apart.
+            // The Gaussians are one unit in the last place apart, in the reverse order of the draw.
             position: [
                 0.0,
                 0.0,
@@ -216,7 +217,7 @@ pub(super) fn state(chapter: &mut Chapter<'_>) {
             );
         }
     }
-    // Alphas at the ceiling are not below a floor that is the same.
+    // If the floor equals the ceiling, alphas at the ceiling still contribute.
     chapter.add("floor_is_ceiling", || {
         Draw::new(many(3, |index| Gaussian {
             position: [0.8 * index as f32 - 0.8, 0.0, 4.0],
@@ -240,7 +241,7 @@ pub(super) fn state(chapter: &mut Chapter<'_>) {
                 .transmittance_floor(0.0)
         })
     });
-    // The first one would leave nothing: nothing contributes.
+    // The first Gaussian would leave a transmittance of zero, so nothing contributes.
     chapter.add("opaque_first", || {
         Draw::new(many(1, |_| Gaussian {
             opacity: 4.0,
@@ -259,7 +260,7 @@ pub(super) fn state(chapter: &mut Chapter<'_>) {
             Draw::new(scene)
         });
     }
-    // Wide ones alone show where a cut-off is.
+    // Only wide Gaussians show where the cut-off is.
     for floor in [1e-6, 1e-4, 1.0 / 255.0] {
         chapter.add(format!("reach.floor_{floor:.6}"), move || {
             Draw::new(many(1, |_| Gaussian {
@@ -269,7 +270,7 @@ pub(super) fn state(chapter: &mut Chapter<'_>) {
             .in_state(|state| state.alpha_floor(floor))
         });
     }
-    // What ends a pixel does not contribute.
+    // The Gaussian that ends a pixel does not contribute.
     for end in [0.3, 0.55, 0.9] {
         chapter.add(format!("ends.{end}"), move || {
             Draw::new(dense(12, 0)).in_state(|state| state.transmittance_floor(end))

@@ -1,4 +1,5 @@
-//! Where digits are lost: needles, discs from the side, far coordinates, thousands of layers, giants and dust.
+//! Numerically difficult input: needles, discs seen from the side, far coordinates, thousands of layers, very large and
+//! very small Gaussians.
 
 use gaurast::vk::GaussianAntialiasingGAURAST as Antialiasing;
 
@@ -7,7 +8,7 @@ use super::modes::ORDERS;
 use super::scenes::{Gaussian, ball, cloud, dense, front, many, strange};
 use crate::draw::{Camera, Draw};
 
-/// A rotation that tells the number of a Gaussian.
+/// A rotation that differs for each Gaussian index.
 fn turned(index: usize) -> [f32; 4] {
     let angle = index as f32;
     [
@@ -18,7 +19,7 @@ fn turned(index: usize) -> [f32; 4] {
     ]
 }
 
-/// Places in front of the camera, in no order.
+/// A position in front of the camera for each Gaussian index, in no particular order.
 fn spread(index: usize) -> [f32; 3] {
     let at = |step: usize| ((index * step) % 101) as f32 / 50.0 - 1.0;
     let z = 3.0 + 2.0 * at(67);
@@ -64,7 +65,7 @@ pub(super) fn numerics(chapter: &mut Chapter<'_>) {
                 .in_state(|state| state.antialiasing(Antialiasing::OPACITY_COMPENSATED))
         });
     }
-    // Discs seen nearly from their edge.
+    // Discs seen at a grazing angle.
     for angle in [0.0, 1e-6, 1e-3] {
         chapter.add(format!("edge_on_{angle}"), move || {
             let [sin, cos] = [0.5 * (std::f32::consts::FRAC_PI_2 + angle)]
@@ -136,7 +137,7 @@ pub(super) fn numerics(chapter: &mut Chapter<'_>) {
             );
         }
     }
-    // The eye within Gaussians, and their centres just before it.
+    // The eye is inside the Gaussians, with their centres just in front of it.
     for z in [0.201_f32, 0.25, 0.5] {
         chapter.add(format!("close_{z}"), move || {
             Draw::new(many(5, |index| Gaussian {

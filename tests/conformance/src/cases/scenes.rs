@@ -1,11 +1,11 @@
-//! Scenes and cameras of the tables.
+//! Scenes and cameras that the tables of cases use.
 
 use gaurast::vk::GaussianCameraModelGAURAST as Model;
 pub(super) use gaurast_oracle::scenes::{Gaussian, SceneBuffers, awkward, cloud};
 
 use crate::draw::{Camera, SIZE};
 
-/// A cloud of Gaussians that overlap: most pixels see many.
+/// A cloud of overlapping Gaussians: most pixels are covered by many.
 pub(super) fn dense(seed: u64, degree: u32) -> SceneBuffers {
     let mut scene = cloud(seed, 500, degree);
     for scale in scene.scales.as_flattened_mut() {
@@ -14,7 +14,7 @@ pub(super) fn dense(seed: u64, degree: u32) -> SceneBuffers {
     scene
 }
 
-/// A few large ones: the oracle of binary16 looks at each of them at every pixel.
+/// A few large Gaussians. The binary16 oracle evaluates each of them at every pixel.
 pub(super) fn few(seed: u64, degree: u32) -> SceneBuffers {
     let mut scene = cloud(seed, 100, degree);
     for scale in scene.scales.as_flattened_mut() {
@@ -50,7 +50,7 @@ pub(super) fn ball() -> Gaussian {
     }
 }
 
-/// `count` Gaussians, the number of each given to `make`.
+/// `count` Gaussians, each made by `make` from its index.
 pub(super) fn many(count: usize, make: impl Fn(usize) -> Gaussian) -> SceneBuffers {
     SceneBuffers::new(0, (0..count).map(make))
 }
@@ -60,7 +60,7 @@ pub(super) fn front() -> Camera {
     gaurast_oracle::scenes::camera(SIZE[0], SIZE[1]).to_vulkan()
 }
 
-/// Pinholes.
+/// Pinhole cameras.
 pub(super) fn pinholes() -> Vec<(&'static str, Camera)> {
     let front = front();
     vec![
@@ -88,7 +88,7 @@ pub(super) fn pinholes() -> Vec<(&'static str, Camera)> {
     ]
 }
 
-/// Parallel projections.
+/// Orthographic cameras.
 pub(super) fn parallels() -> Vec<(&'static str, Camera)> {
     let parallel = front()
         .model(Model::ORTHOGRAPHIC)
@@ -103,7 +103,7 @@ pub(super) fn parallels() -> Vec<(&'static str, Camera)> {
     ]
 }
 
-/// Cameras of all models, from in front, from inside, turned, mirrored and wide.
+/// Cameras of all models: from the front, from inside, rotated, mirrored and wide.
 pub(super) fn cameras() -> Vec<(&'static str, Camera)> {
     let fisheye = front().model(Model::FISHEYE);
     let panorama = fisheye
@@ -129,7 +129,7 @@ pub(super) fn cameras() -> Vec<(&'static str, Camera)> {
                 .focal_length([30.0, 22.0])
                 .principal_point([90.0, 35.0]),
         ),
-        // More than three periods wide.
+        // The picture is more than three periods wide.
         ("panorama_repeated", panorama.focal_length([4.5, 20.0])),
     ]);
     cameras

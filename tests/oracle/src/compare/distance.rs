@@ -1,8 +1,8 @@
-//! How far a pixel is from a reference.
+//! The distance of a pixel from a reference.
 
 use crate::oracle::Reference;
 
-/// Whether a pixel within the envelope differs from what binary64 says.
+/// True if a pixel within the envelope differs from the binary64 result.
 pub(super) fn took_other_branch(
     rgba: [f32; 4],
     reference: &Reference,
@@ -13,7 +13,7 @@ pub(super) fn took_other_branch(
         && distance_between(rgba, reference.nominal[index]) > distance
 }
 
-/// How far a pixel's worst channel is from the hull of its outcomes.
+/// The distance of a pixel's worst channel from the hull of its outcomes.
 pub(super) fn distance_from_envelope(rgba: [f32; 4], reference: &Reference, index: usize) -> f64 {
     let (least, greatest) = reference.envelope(index);
     let outside = |channel: usize| {
@@ -26,7 +26,7 @@ pub(super) fn distance_from_envelope(rgba: [f32; 4], reference: &Reference, inde
     (0..4).map(outside).fold(0.0, f64::max)
 }
 
-/// How far a pixel's worst channel is from `expected`.
+/// The distance of a pixel's worst channel from `expected`.
 pub(super) fn distance_between(rgba: [f32; 4], expected: [f64; 4]) -> f64 {
     let difference = |channel: usize| {
         let value = f64::from(rgba[channel]);

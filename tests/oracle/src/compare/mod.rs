@@ -1,10 +1,10 @@
-//! Holding an image against a reference.
+//! Comparison of an image with a reference.
 //!
-//! Two questions, kept apart:
-//! - *Does it keep the accuracy contract?* [`verdict`] answers yes or no, from the oracle's
-//!   [`Reference`](crate::oracle::Reference); [`assert_contract`] makes a test of it.
-//! - *How different do two pictures look?* [`Statistics`] says so for people and benchmark tables:
-//!   greatest difference, 99.9th percentile, PSNR and FLIP.
+//! There are two kinds of comparison:
+//! - The accuracy contract. [`verdict`] tells if an image keeps it, given the oracle's
+//!   [`Reference`](crate::oracle::Reference). [`assert_contract`] makes a test of it.
+//! - The visible difference. [`Statistics`] gives the greatest difference, the 99.9th percentile, PSNR and FLIP, for
+//!   people and for tables of benchmarks.
 //!
 //! Images are slices of premultiplied red, green, blue and alpha, row by row from the top.
 

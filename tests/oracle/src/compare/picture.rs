@@ -8,7 +8,7 @@ use thiserror::Error;
 use super::distance::{distance_between, distance_from_envelope, took_other_branch};
 use crate::oracle::Reference;
 
-/// Why a picture could not be written.
+/// An error of writing a picture.
 #[derive(Debug, Error)]
 pub enum PictureError {
     /// The folder could not be made.
@@ -21,9 +21,8 @@ pub enum PictureError {
 
 /// Writes a PNG of three panels: the reference, the image, and their difference.
 ///
-/// In the third panel grey is the distance from what binary64 says on a logarithmic scale, black
-/// for 1e-7 and less, white for 1. Pixels further than `limit` from the envelope are red, pixels
-/// that took another branch are blue.
+/// In the third panel grey is the distance from the binary64 result on a logarithmic scale: black for 1e-7 and less,
+/// white for 1. Pixels further than `limit` from the envelope are red. Pixels on another branch are blue.
 pub fn write_difference(
     path: &Path,
     image: &[[f32; 4]],

@@ -1,4 +1,4 @@
-//! The accuracy contract as a yes or no.
+//! The accuracy contract as a judgement: an image keeps it or does not.
 
 use std::fmt;
 use std::path::Path;
@@ -7,12 +7,12 @@ use super::distance::{distance_between, distance_from_envelope, took_other_branc
 use super::picture::write_difference;
 use crate::oracle::Reference;
 
-/// What an image may not exceed.
+/// The limits that an image must not exceed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
     /// Greatest distance from the envelope, in any channel of any pixel.
     pub distance: f64,
-    /// Share of pixels that took another branch than binary64.
+    /// Share of pixels that match another outcome than the binary64 one.
     pub other_branch: f64,
     /// Share of pixels that the reference calls undecidable.
     pub undecidable: f64,
@@ -26,8 +26,8 @@ impl Limits {
         undecidable: 0.01,
     };
 
-    /// The contract's distance for scenes made to be difficult, or too small for shares of pixels
-    /// to mean anything: still no pixel is excluded, but any number may be undecidable.
+    /// The contract's distance without limits on shares of pixels. It serves scenes that are made to be difficult, and
+    /// scenes too small for shares to be significant. No pixel is excluded, but any number may be undecidable.
     pub const ENVELOPE_ONLY: Self = Self {
         other_branch: 1.0,
         undecidable: 1.0,
@@ -35,10 +35,10 @@ impl Limits {
     };
 }
 
-/// How an image stands to a reference.
+/// The result of judging an image by a reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Verdict {
-    /// What it was judged by.
+    /// The limits by which it was judged.
     pub limits: Limits,
     /// Pixels of the image.
     pub pixels: usize,
@@ -49,18 +49,18 @@ pub struct Verdict {
     pub worst_pixel: [u32; 2],
     /// Pixels further from the envelope than the limit.
     pub outside: usize,
-    /// Pixels within the envelope that don't match what binary64 says.
+    /// Pixels within the envelope that differ from the binary64 result.
     pub other_branch: usize,
-    /// Those of them that match no single outcome, either: they lie between two.
+    /// Pixels of `other_branch` that match no single outcome and lie between two.
     pub between_branches: usize,
     /// Pixels that the reference calls undecidable.
     pub undecidable: usize,
-    /// Undecidable pixels for which the reference gave up following every branch.
+    /// Undecidable pixels for which the reference stopped before it had followed every branch.
     pub exhausted: usize,
 }
 
 impl Verdict {
-    /// Whether the image keeps all limits.
+    /// True if the image keeps all limits.
     pub fn holds(&self) -> bool {
         let share = |count: usize| count as f64 / self.pixels as f64;
         self.outside == 0

@@ -1,4 +1,5 @@
-//! Attributes of what trained files hold, each function in binary64 and rounded once to binary32.
+//! Activation functions of trained files: from stored logarithms and logits to attributes. Each function is evaluated
+//! in binary64 and rounded once to binary32.
 
 /// The standard deviation of a logarithm.
 pub fn scale_of_logarithm(logarithm: f32) -> f32 {

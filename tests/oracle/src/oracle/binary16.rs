@@ -1,9 +1,10 @@
-//! Steps 6 and 7 in binary16: what the specification says of `FLOAT16`, every result rounded where it says so.
+//! Steps 6 and 7 in binary16, as the specification defines `FLOAT16`: every result is rounded where the specification
+//! says so.
 //!
-//! Given a Gaussian's mean, covariance, opacity and colour, that is defined to the bit. These come out of arithmetic whose last
-//! digits are free, though: where one of them lies next to the middle between two binary16 numbers, it may be rounded to
-//! either, and 2 to the power of the exponent is within [`OF_POWER`] units in the last place. All ways that follow are
-//! followed; a pixel's envelope is what they reach, and it is a point nearly everywhere.
+//! Given a Gaussian's mean, covariance, opacity and colour, the result is defined to the bit. But these inputs come
+//! from arithmetic whose last digits are free. An input that is close to the midpoint of two binary16 numbers may be
+//! rounded to either, and 2 to the power of the exponent is within [`OF_POWER`] units in the last place. The reference
+//! follows all possibilities. A pixel's envelope is their range, which is a single point nearly everywhere.
 
 use half::f16;
 use rayon::prelude::*;
@@ -15,11 +16,11 @@ use super::{
     OracleCamera, OracleGeometry, OracleOrder, OracleScene, OracleState, Reference, SkipCounts,
 };
 
-/// What binary64 may lose of what a pixel is given, relative to what went into it.
+/// The error that binary64 may have in an input of a pixel, relative to the terms of the input.
 const SLACK: f64 = 1e-10;
-/// Within how many units in the last place a power of two is.
+/// The error bound of a power of two, in units in the last place.
 const OF_POWER: f64 = 0.501;
-/// What a few roundings to binary32 may lose of a colour, relative to its terms' sizes.
+/// The error of a colour after a few roundings to binary32, relative to the size of its terms.
 const OF_COLOR: f64 = 24.0 / 16_777_216.0;
 /// The greatest binary16 number, which is also the greatest colour.
 const GREATEST: f64 = 65504.0;
@@ -32,12 +33,12 @@ fn round(x: f64) -> f64 {
     f64::from(f16::from_f32(x as f32)) + 0.0
 }
 
-/// Binary16 numbers of which one is meant, the one of binary64 first; NaN is one of them.
+/// The binary16 numbers that a value may have, the binary64 one first. NaN may be one of them.
 #[derive(Clone, Copy, Debug)]
 struct Few {
     values: [f64; 8],
     count: usize,
-    /// Whether there would be more.
+    /// True if there are more possible values than are kept.
     exhausted: bool,
 }
 
@@ -54,7 +55,7 @@ impl Few {
         one
     }
 
-    /// What numbers within `slack` of `x` are rounded to.
+    /// The results of rounding the numbers within `slack` of `x`.
     fn near(x: f64, slack: f64) -> Self {
         let mut near = Self::one(round(x));
         if x.is_finite() {
@@ -85,12 +86,12 @@ impl Few {
         &self.values[..self.count]
     }
 
-    /// What `f` of one of these may be rounded to.
+    /// The possible rounded values of `f` of one of these.
     fn map(&self, f: impl Fn(f64) -> f64) -> Self {
         self.with(&Self::one(0.0), |x, _| f(x))
     }
 
-    /// What `f` of one of these and one of the others may be rounded to.
+    /// The possible rounded values of `f` of one of these and one of `other`.
     fn with(&self, other: &Self, f: impl Fn(f64, f64) -> f64) -> Self {
         let mut results = Self {
             exhausted: self.exhausted || other.exhausted,
@@ -116,7 +117,7 @@ fn next_up(x: f64) -> f64 {
     f64::from(f16::from_bits(next)) + 0.0
 }
 
-/// What the power of two is rounded to.
+/// The possible rounded values of the power of two.
 fn exp2(exponent: f64) -> Few {
     let power = exponent.exp2();
     // Units are 2^-24 below 2^-14.
@@ -124,7 +125,7 @@ fn exp2(exponent: f64) -> Few {
     Few::near(power, (OF_POWER - 0.5) * unit)
 }
 
-/// A colour's terms without their signs. No basis function is greater than 3.
+/// The sums of the absolute values of a colour's terms. No basis function is greater than 3.
 fn magnitude(coefficients: &[[f32; 3]]) -> [f64; 3] {
     let sum = |c: usize| {
         coefficients
@@ -135,10 +136,10 @@ fn magnitude(coefficients: &[[f32; 3]]) -> [f64; 3] {
     [0, 1, 2].map(|c| 0.5 + 3.0 * sum(c))
 }
 
-/// A Gaussian as a processing element is given it.
+/// A Gaussian after the rounding of a processing element's inputs.
 struct Rounded<'a> {
     splat: &'a Splat,
-    /// How far the mean may be off, in px.
+    /// The possible error of the mean, in px.
     of_mean: [f64; 2],
     factor: [Few; 3],
     log2_opacity: Few,
@@ -204,7 +205,7 @@ impl<'a> Rounded<'a> {
     }
 }
 
-/// The state as a processing element is given it.
+/// The state after the rounding of a processing element's inputs.
 struct Thresholds {
     alpha_floor: f64,
     alpha_ceiling: f64,
@@ -228,7 +229,7 @@ impl Way {
 
     /// Step 7, with the least and the greatest colour that the Gaussian may have.
     fn behind(mut self, alpha: f64, colors: [[f64; 3]; 2], thresholds: &Thresholds) -> Self {
-        // An alpha that is no number is below every floor.
+        // NaN is below every floor.
         if self.finished || alpha.is_nan() || alpha < thresholds.alpha_floor {
             return self;
         }
@@ -301,7 +302,7 @@ impl Pixel {
         self.ways = ways;
     }
 
-    /// The corners of the envelope, where it isn't what binary64 says alone.
+    /// The corners of the envelope, or `None` if the envelope is the binary64 result alone.
     fn alternatives(&self) -> Option<Vec<[f64; 4]>> {
         let nominal = self.nominal.rgba()[0];
         let (mut least, mut greatest) = (nominal, nominal);

@@ -1,8 +1,7 @@
-//! How far an honest binary32 implementation may be from binary64.
+//! A bound on the distance of a correct binary32 implementation from binary64.
 //!
-//! The model serves one purpose: to tell which comparisons cannot be demanded of such an
-//! implementation. It is a first-order bound in the unit roundoff u = 2^-24, per Gaussian and
-//! pixel, and small where the Gaussian is well conditioned.
+//! The model tells which comparisons cannot be required of such an implementation. It is a first-order bound in the
+//! unit roundoff u = 2^-24, per Gaussian and pixel. It is small if the Gaussian is well conditioned.
 //!
 //! # Alpha
 //!
@@ -10,7 +9,7 @@
 //! `q = |y|^2` and `w = S^-1 d = L^-T y`. An error of the exponent `q / 2` is a relative error of
 //! alpha.
 //! - *M.* Row i is a product of the Jacobian's row `j_i`, two rotations and the scales, each
-//!   rounded; the rounding of a row of norm `|j_i|` is stretched by the scales, so
+//!   rounded; the rounding error of a row of norm `|j_i|` is multiplied by the scales, so
 //!   `|dm_i| <= c u |j_i| max(s)`. Since `dS = dM M^T + M dM^T`,
 //!   `|d(q/2)| = |(dM^T w) . (M^T w)| <= c u (sum_i |w_i| |j_i| max(s)) sqrt(q)`, for
 //!   `|M^T w|^2 <= w^T S w = q`.
@@ -20,40 +19,40 @@
 //! - *d.* Each component is rounded once, `|d_i| <= sqrt(S_ii) sqrt(q)`, and the mean's fraction
 //!   may be held in binary32, below one pixel: `|d(q/2)| <= u sum_i |w_i| (sqrt(S_ii) sqrt(q) + 1)`.
 //!
-//! With `b_i = sqrt((|j_i| max(s))^2 + lowPass) >= sqrt(S_ii)` they add up to
-//! `c u sum_i |w_i| (b_i sqrt(q) + 1)`, c = [`GEOMETRY`]. What remains doesn't depend on the
-//! geometry: rounding of the exponent (whose `q / 2` the sum above covers, being at least `q`), the
-//! exponential, and a few products, or a row recurrence of eight steps in place of the
-//! exponential: [`FIXED`] u = 2.9e-6. The exponent may have the opacity folded in:
-//! `2 u |log2 o|`. Opacity compensation multiplies by `|m0 x m1| / sqrt(det S)`, whose relative
-//! error is `c u b_0 b_1 / |m0 x m1|`.
+//! With `b_i = sqrt((|j_i| max(s))^2 + lowPass) >= sqrt(S_ii)` their sum is
+//! `c u sum_i |w_i| (b_i sqrt(q) + 1)`, c = [`GEOMETRY`]. The other errors do not depend on the
+//! geometry. The first is [`FIXED`] u = 2.9e-6, for the rounding of the exponent, the exponential, and
+//! a few products, or for a row recurrence of eight steps in place of the exponential. (The sum above
+//! is at least `q`, so it covers the rounding of `q / 2`.) The second is `2 u |log2 o|`, since the
+//! exponent may contain the logarithm of the opacity. Opacity compensation multiplies by `|m0 x m1| / sqrt(det S)`,
+//! whose relative error is `c u b_0 b_1 / |m0 x m1|`.
 //!
 //! # Transmittance
 //!
-//! `T' = T (1 - alpha)` is carried with an absolute error bound:
+//! `T' = T (1 - alpha)` has an absolute error bound:
 //! `E' = E (1 - alpha) + T (error of alpha) + 2 u T'`. It grows with the number of layers, and
-//! fast where alpha is near one. A clamped alpha has no error.
+//! fast if alpha is near one. A clamped alpha has no error.
 
 /// Unit roundoff of binary32.
 pub const UNIT_ROUNDOFF: f64 = 1.0 / 16_777_216.0;
 
-/// Relative error of alpha in units of roundoff that every Gaussian is granted.
+/// Relative error of alpha, in units of roundoff, that is allowed for every Gaussian.
 pub const FIXED: f64 = 48.0;
 
-/// Roundings granted to the projected covariance and the quadratic form.
+/// Number of roundings allowed for the projected covariance and the quadratic form.
 pub const GEOMETRY: f64 = 8.0;
 
 /// The part of the model that belongs to one Gaussian.
 #[derive(Clone, Copy, Debug)]
 pub struct ErrorModel {
-    /// `b_0, b_1` of the module's text, in px.
+    /// `b_0, b_1` of the module's documentation, in px.
     spread: [f64; 2],
-    /// What doesn't change from pixel to pixel, in units of roundoff.
+    /// The part that is the same for all pixels, in units of roundoff.
     fixed: f64,
 }
 
 impl ErrorModel {
-    /// `spread` is `b_0, b_1`; `area` is `|m0 x m1|` where opacity is compensated.
+    /// The model of a Gaussian: `spread` is `b_0, b_1`; `area` is `|m0 x m1|` if opacity is compensated.
     pub(super) fn new(spread: [f64; 2], opacity: f64, area: Option<f64>) -> Self {
         let folded = if opacity > 0.0 {
             2.0 * opacity.log2().abs()
@@ -67,7 +66,7 @@ impl ErrorModel {
         }
     }
 
-    /// Bound on the relative error of alpha, at most 1, where `w = S^-1 d` and `q = d . w`.
+    /// Bound on the relative error of alpha, at most 1, with `w = S^-1 d` and `q = d . w`.
     pub fn alpha(&self, w: [f64; 2], q: f64) -> f64 {
         let root = q.sqrt();
         let geometry =
@@ -91,18 +90,18 @@ impl ErrorModel {
 pub struct Transmittance {
     /// The binary64 value.
     pub value: f64,
-    /// How far a binary32 implementation may be from it.
+    /// The bound on the distance of a binary32 implementation from it.
     pub error: f64,
 }
 
 impl Transmittance {
-    /// Nothing in front yet.
+    /// The transmittance in front of the first Gaussian.
     pub const ONE: Self = Self {
         value: 1.0,
         error: 0.0,
     };
 
-    /// What is left behind a layer of `alpha`, itself known to within `alpha_error`.
+    /// The transmittance behind a layer of `alpha`, which is known to within `alpha_error`.
     pub fn behind(self, alpha: f64, alpha_error: f64) -> Self {
         let value = self.value * (1.0 - alpha);
         Self {

@@ -1,4 +1,4 @@
-//! What a draw takes: Gaussians, camera and state, after conversion to binary32.
+//! The inputs of a draw after conversion to binary32: Gaussians, camera and state.
 
 use gaurast::vk::{
     GaussianAntialiasingGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST,
@@ -33,7 +33,7 @@ pub struct OracleScene<'a> {
     pub instances: &'a [OracleInstance],
 }
 
-/// What places a copy of a Gaussian in the world.
+/// The placement of a copy of a Gaussian in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OracleInstance {
     /// The rows of a matrix from model to world space.
@@ -61,7 +61,7 @@ impl OracleScene<'_> {
         self.positions.len()
     }
 
-    /// Whether the draw has no Gaussian.
+    /// True if the draw has no Gaussian.
     pub fn is_empty(&self) -> bool {
         self.positions.is_empty()
     }
@@ -78,7 +78,7 @@ impl OracleScene<'_> {
         &self.sh[index * stored..][..drawn]
     }
 
-    /// What places Gaussian `index` in the world.
+    /// The placement of Gaussian `index` in the world; the identity if the draw has no instances.
     pub(super) fn instance(&self, index: usize) -> OracleInstance {
         self.instances.get(index).copied().unwrap_or_default()
     }
@@ -89,7 +89,7 @@ impl OracleScene<'_> {
     }
 }
 
-/// How a camera projects.
+/// The projection model of a camera.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum OracleModel {
     /// Perspective.
@@ -103,7 +103,7 @@ pub enum OracleModel {
     Equirectangular,
 }
 
-/// What a Gaussian is in space.
+/// The shape of a Gaussian in space.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum OracleGeometry {
     /// A volume.
@@ -113,7 +113,7 @@ pub enum OracleGeometry {
     Surfel,
 }
 
-/// What Gaussians are sorted by.
+/// The order of Gaussians.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum OracleOrder {
     /// The depth variable.
@@ -123,14 +123,14 @@ pub enum OracleOrder {
     RadialDistance,
     /// The order of the draw.
     Primitive,
-    /// At each pixel, the depth at which a Gaussian is greatest on the pixel's ray.
+    /// At each pixel, the depth at which a Gaussian's density is greatest on the pixel's ray.
     PerPixel,
 }
 
 /// A camera and the viewport that it fills, as `VkGaussianCameraGAURAST` holds them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OracleCamera {
-    /// How it projects.
+    /// The projection model.
     pub model: OracleModel,
     /// Width of the viewport in pixels.
     pub width: u32,
@@ -138,7 +138,7 @@ pub struct OracleCamera {
     pub height: u32,
     /// World to camera, row-major; the camera looks along +z, +x is right and +y is down.
     pub rotation: [f32; 9],
-    /// Where the camera is in world space.
+    /// The camera's position in world space.
     pub eye: [f64; 3],
     /// Focal lengths in pixels (per unit of length, or per radian).
     pub focal: [f32; 2],
@@ -161,13 +161,13 @@ pub struct OracleState {
     pub alpha_ceiling: f32,
     /// A pixel is finished before the Gaussian that would bring its transmittance below this.
     pub transmittance_floor: f32,
-    /// Whether opacity makes up for the area that the low-pass filter adds.
+    /// True if opacity compensates for the area that the low-pass filter adds.
     pub opacity_compensated: bool,
-    /// Whether Gaussians are projected by the unscented transform.
+    /// True if Gaussians are projected by the unscented transform.
     pub unscented: bool,
-    /// What Gaussians are.
+    /// The shape of Gaussians.
     pub geometry: OracleGeometry,
-    /// What Gaussians are sorted by.
+    /// The order of Gaussians.
     pub order: OracleOrder,
 }
 

@@ -3,7 +3,7 @@
 use super::inputs::OracleInstance;
 use super::vectors::dot;
 
-/// What an instance is to the projection, in binary64.
+/// The model matrix of an instance in binary64.
 pub struct Model {
     /// The matrix without its translation.
     pub linear: [[f64; 3]; 3],
@@ -36,7 +36,7 @@ impl Model {
         std::array::from_fn(|k| v[0] * a[0][k] + v[1] * a[1][k] + v[2] * a[2][k])
     }
 
-    /// |det A| is greater than 2^-40 times the product of the lengths of its rows.
+    /// True if |det A| is greater than 2^-40 times the product of the lengths of its rows.
     pub fn is_regular(&self) -> bool {
         let lengths: f64 = self.linear.map(|row| dot(row, row).sqrt()).iter().product();
         self.determinant().abs() > lengths / 2f64.powi(40)

@@ -1,52 +1,48 @@
-//! What a Gaussian draw means, in binary64 and without haste.
+//! The reference for Gaussian draws, in binary64.
 //!
-//! This is the reference that every fast kernel is held against. It follows the seven normative
-//! steps of the extension's specification one by one, shares no code with the driver or the
-//! device, and prefers the form that can be read over the form that runs:
+//! Every fast kernel is compared with it. It follows the seven normative steps of the extension's specification one by
+//! one and shares no code with the driver or the device. It prefers readable code to fast code:
 //!
 //! | step | what | where |
 //! |---|---|---|
-//! | before | attributes of logarithms and logits | [`activation`] |
+//! | before | attributes from logarithms and logits | [`activation`] |
 //! | 1, 2 | what is skipped, and under which reason | [`project`] |
 //! | 3, 4 | mean, covariance, determinant, opacity compensation | [`project`] |
-//! | 1 to 5 | of what a vertex shader has projected | [`shaded`] |
+//! | 1 to 5 | the same for outputs of a vertex shader | [`shaded`] |
 //! | 5 | colour from spherical harmonics | [`spherical_harmonics`] |
 //! | 6 | alpha at a pixel centre | [`splat`] |
 //! | 7 | compositing front to back | [`pixel`] |
 //! | 6, 7 | the same in binary16 | [`render_binary16`] |
 //! | 7 | the per-pixel order | [`rays`], [`own_axes`] |
 //! | 3, 6 | 2D Gaussians | [`surfel`] |
-//! | then | what a resolve shader reads | [`resolve`] |
-//! | then | depth and stencil, sample by sample | [`sample_tests`] |
+//! | then | the inputs of a resolve shader | [`resolve`] |
+//! | then | depth and stencil tests, sample by sample | [`sample_tests`] |
 //!
-//! The inputs are attributes and camera *after* conversion to binary32 (the eye: binary64), which
-//! is what the device is given too; every one of them converts exactly to `f64`, and nothing is
-//! rounded again but the depth key, which the specification rounds.
+//! The inputs are attributes and camera *after* conversion to binary32 (the eye: binary64), as the device gets them.
+//! Each of them converts exactly to `f64`. Nothing is rounded again but the depth key, which the specification rounds.
 //!
-//! # Decisions that binary32 cannot be held to
+//! # Decisions that cannot be required of binary32
 //!
-//! Two comparisons decide whether a Gaussian counts at a pixel: `alpha >= alphaFloor` and
-//! `T (1 - alpha) < transmittanceFloor`. Where the two sides differ by less than an honest
-//! binary32 implementation may err ([`error_model`]), the reference does not say which way is
-//! right. It calls the pixel *undecidable* and follows both, up to [`MAX_DECISIONS`] times along
-//! one path. A pixel then has several outcomes, the first of which is what binary64 says;
-//! [`crate::compare`] holds an image against all of them.
+//! Two comparisons decide if a Gaussian contributes to a pixel: `alpha >= alphaFloor` and `T (1 - alpha) <
+//! transmittanceFloor`. If the two sides differ by less than the error of a correct binary32 implementation
+//! ([`error_model`]), either result is right. The reference then calls the pixel *undecidable* and follows both
+//! branches, up to [`MAX_DECISIONS`] times along one path. Such a pixel has several outcomes, the first of which is the
+//! binary64 result. [`crate::compare`] compares an image with all of them.
 //!
-//! A third one, `T >= 1/2`, says which Gaussian is a pixel's median; nothing else follows from it, so a pixel
-//! simply has every median that it may have.
+//! A third comparison, `T >= 1/2`, selects the Gaussian that is a pixel's median. It changes nothing else, so a pixel
+//! keeps a list of all its possible medians.
 //!
 //! In the per-pixel order, neighbours whose depths along the ray may round either way are followed in both orders
 //! ([`rays`]).
 //!
 //! Three more decisions exist and are not followed both ways:
-//! - the depth key is `t.z` rounded to binary32. Where the binary64 value lies within its own
-//!   rounding error of the middle between two binary32 values, the key could be either; that
-//!   happens to about one Gaussian in 10^8 and matters only if another one has just that key. Such
-//!   Gaussians are counted ([`Reference::undecidable_keys`]).
-//! - a determinant that is zero in exact arithmetic and not in binary64, or the reverse, needs
-//!   `lowPass = 0` and a Gaussian of no thickness.
-//! - the clamps (ceiling of alpha, `u` and `v`, colour) are continuous: either side gives the same
-//!   value to within the error itself.
+//! - The depth key is `t.z` rounded to binary32. If the binary64 value is within its own error of the midpoint of two
+//!   binary32 values, the key could be either. This happens to about one Gaussian in 10^8 and matters only if another
+//!   Gaussian has one of these two keys. Such Gaussians are counted ([`Reference::undecidable_keys`]).
+//! - A determinant may be zero in exact arithmetic and not in binary64, or the reverse. This needs `lowPass = 0` and a
+//!   Gaussian of no thickness.
+//! - The clamps (ceiling of alpha, `u` and `v`, colour) are continuous: both sides give the same value to within the
+//!   error.
 
 pub mod activation;
 mod binary16;

@@ -1,9 +1,9 @@
 //! A Gaussian in its own axes: depth along a pixel's ray.
 //!
-//! A pixel's ray starts at `e + R^T o` and runs along `R^T r`. With `B = diag(1 / s') R(q)^T`, the standard deviations `s'`
-//! at least 2^-10 of the greatest (all 1 if that is 0), a Gaussian about `p` is greatest on the ray at
-//! `tau = (a . b) / (a . a)`, where `a = B R^T r` and `b = B (p - e - R^T o)`. Depths are compared after rounding to 36 bits
-//! of the significand, equal ones by the order of the draw.
+//! A pixel's ray starts at `e + R^T o` and runs along `R^T r`. With `B = diag(1 / s') R(q)^T`, the standard deviations
+//! `s'` at least 2^-10 of the greatest (all 1 if that is 0), a Gaussian about `p` is greatest on the ray at `tau = (a .
+//! b) / (a . a)`, where `a = B R^T r` and `b = B (p - e - R^T o)`. Depths are compared after rounding to 36 bits of the
+//! significand, equal ones by the order of the draw.
 
 use super::vectors::dot;
 use super::{OracleCamera, OracleModel};
@@ -11,7 +11,7 @@ use super::{OracleCamera, OracleModel};
 /// The least standard deviation as a share of the greatest.
 const LEAST_RATIO: f64 = 1.0 / 1024.0;
 
-/// Roundings of binary64 granted to `a` and `b`.
+/// Number of binary64 roundings allowed for `a` and `b`.
 const ROUNDINGS: f64 = 32.0;
 
 /// A Gaussian in its own axes, in standard deviations.
@@ -26,20 +26,20 @@ pub struct OwnAxes {
 /// A depth along a ray.
 #[derive(Clone, Copy, Debug)]
 pub struct RayDepth {
-    /// What binary64 says.
+    /// The binary64 result.
     pub value: f64,
-    /// How far an implementation in binary64 may be from it.
+    /// The possible error of an implementation in binary64.
     pub error: f64,
 }
 
 impl OwnAxes {
-    /// Of what is nowhere but in the picture.
+    /// The depth of a Gaussian that has no place in space, only in the picture.
     pub(super) const NONE: Self = Self {
         rows: [[0.0; 3]; 3],
         offset: [0.0; 3],
     };
 
-    /// Of a Gaussian whose own axes are the columns of `axes` (row-major), `offset` from the eye.
+    /// The own axes of a Gaussian: the columns of `axes` (row-major), with its centre at `offset` from the eye.
     pub(super) fn new(axes: &[f64; 9], scale: [f64; 3], offset: [f64; 3]) -> Self {
         let greatest = scale[0].max(scale[1]).max(scale[2]);
         let rows = [0, 1, 2].map(|row| {
@@ -89,7 +89,7 @@ impl OwnAxes {
         let b = self.rows.map(|row| dot(row, from));
         let square = dot(a, a);
         let value = dot(a, b) / square;
-        // Sums of products: each term's rounding, however the terms cancel.
+        // The sum of the rounding errors of all terms, even if the terms cancel.
         let unit = 0.5 * f64::EPSILON * ROUNDINGS;
         let size = |v: [f64; 3]| dot(v, v).sqrt();
         let stretch = self

@@ -1,4 +1,4 @@
-//! Longitude and latitude, and pictures that repeat.
+//! The equirectangular projection: longitude and latitude, and pictures that repeat.
 
 use super::{OracleCamera, OracleModel};
 use std::f64::consts::TAU;
@@ -6,8 +6,8 @@ use std::f64::consts::TAU;
 /// The cosine of the latitude beyond which the Jacobian no longer grows.
 const POLE: f64 = 1.0 / 1024.0;
 
-/// The mean and the Jacobian of a panorama: those of atan2(t.x, t.z) and atan2(t.y, |t.xz|), where the distance from the
-/// axis through the poles is kept from falling below `POLE` times the distance.
+/// The mean and the Jacobian of a panorama: those of atan2(t.x, t.z) and atan2(t.y, |t.xz|), where the distance from
+/// the axis through the poles is kept from falling below `POLE` times the distance.
 pub fn equirectangular(camera: &OracleCamera, t: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
     let [fx, fy] = camera.focal.map(f64::from);
     let [cx, cy] = camera.principal.map(f64::from);
@@ -15,7 +15,7 @@ pub fn equirectangular(camera: &OracleCamera, t: [f64; 3]) -> ([f64; 2], [[f64; 
     let r = (x * x + z * z).sqrt();
     let square = r * r + y * y;
     let from_axis = r.max(POLE * square.sqrt());
-    // On the axis, straight ahead stands for all longitudes.
+    // On the axis the longitude is undefined; straight ahead is used.
     let (sin, cos) = if r == 0.0 { (0.0, 1.0) } else { (x / r, z / r) };
     let jacobian = [
         [fx * cos / from_axis, 0.0, -fx * sin / from_axis],
@@ -28,7 +28,7 @@ pub fn equirectangular(camera: &OracleCamera, t: [f64; 3]) -> ([f64; 2], [[f64; 
     ([fx * x.atan2(z) + cx, fy * y.atan2(r) + cy], jacobian)
 }
 
-/// After how many pixels a camera's picture repeats to the right and to the left.
+/// The number of pixels after which a camera's picture repeats to the right and to the left; infinity if it does not.
 pub fn period(camera: &OracleCamera) -> f64 {
     match camera.model {
         OracleModel::Equirectangular => TAU * f64::from(camera.focal[0]),
@@ -36,8 +36,8 @@ pub fn period(camera: &OracleCamera) -> f64 {
     }
 }
 
-/// How far a pixel is to the right of a mean or of its copies a period beside it, whichever is near: at least -1/2 and
-/// less than 1/2 of a period. Nothing is seen from further away.
+/// The distance of a pixel to the right of a mean, or of the mean's nearest copy one period away: at least -1/2 and
+/// less than 1/2 of a period. `None` if no copy is that near.
 pub fn nearest(dx: f64, period: f64) -> Option<f64> {
     if period == f64::INFINITY {
         return Some(dx);

@@ -1,28 +1,28 @@
-//! Step 7: compositing front to back, both ways where a
-//! decision cannot be demanded of binary32.
+//! Step 7: compositing front to back. Decisions that cannot be required of binary32 are followed both ways.
 
 use super::OracleState;
 use super::error_model::{Transmittance, UNIT_ROUNDOFF};
 use super::splat::{Alpha, Splat};
 
-/// How many undecidable decisions are followed both ways along one path; later ones follow
-/// binary64.
+/// The number of undecidable decisions that are followed both ways along one path. Later ones follow binary64.
 pub const MAX_DECISIONS: u32 = 6;
 
-/// Depth variables, one of which is a pixel's median.
+/// The possible depth variables of a pixel's median.
 #[derive(Clone, Copy, Debug, Default)]
 struct Medians {
     z: [f32; MAX_MEDIANS],
     count: usize,
-    /// Whether there would be more.
+    /// True if there are more than are kept.
     exhausted: bool,
 }
 
-/// How many Gaussians may be the one at which T falls below one half, before the reference gives up.
+/// The greatest number of candidates for the Gaussian at which T falls below one half; the reference gives up beyond
+/// it.
 const MAX_MEDIANS: usize = 4;
 
 impl Medians {
-    /// A Gaussian contributes where `before` is left; it is the median unless less than one half is.
+    /// Adds a Gaussian that contributes where the transmittance is `before`. It is the median candidate unless less
+    /// than one half is left.
     fn add(&mut self, z: f32, before: Transmittance) {
         if before.value + before.error < 0.5 {
             return;
@@ -40,22 +40,22 @@ impl Medians {
     }
 }
 
-/// What became of a pixel in one of its ways.
+/// The result of one path of a pixel.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     /// (C, 1 - T).
     pub rgba: [f64; 4],
-    /// Whether a Gaussian contributed.
+    /// True if a Gaussian contributed.
     pub covered: bool,
     /// Depth variables that the median may have, if covered.
     pub medians: Vec<f32>,
-    /// Whether those are not all.
+    /// True if the list of medians is incomplete.
     pub medians_exhausted: bool,
     /// The sums of weighted depths and of weights.
     pub depths: [f64; 2],
 }
 
-/// One way in which a pixel may come about.
+/// One sequence of decisions at a pixel, and its result so far.
 #[derive(Clone, Copy, Debug)]
 struct Path {
     color: [f64; 3],
@@ -64,7 +64,7 @@ struct Path {
     medians: Medians,
     depths: [f64; 2],
     finished: bool,
-    /// Undecidable decisions behind it, each of which was followed both ways.
+    /// Undecidable decisions taken so far, each of which was followed both ways.
     decisions: u32,
 }
 
@@ -102,11 +102,11 @@ impl Path {
 /// A pixel while Gaussians are added to it, nearest first.
 #[derive(Clone, Debug)]
 pub struct Pixel {
-    /// What binary64 says.
+    /// The path of the binary64 decisions.
     nominal: Path,
-    /// The other ways, in the order in which they parted.
+    /// The other paths, in the order in which they branched off.
     alternatives: Vec<Path>,
-    /// Whether some path met more than [`MAX_DECISIONS`] undecidable decisions.
+    /// True if a path met more than [`MAX_DECISIONS`] undecidable decisions.
     exhausted: bool,
 }
 
@@ -118,7 +118,7 @@ impl Pixel {
         exhausted: false,
     };
 
-    /// Whether no further Gaussian can change it.
+    /// True if no further Gaussian can change it.
     pub fn is_finished(&self) -> bool {
         self.nominal.finished && self.alternatives.iter().all(|path| path.finished)
     }
@@ -145,36 +145,36 @@ impl Pixel {
         self.alternatives.append(&mut step.forks);
     }
 
-    /// Takes all ways of a pixel that came about in another order.
+    /// Takes all paths of a pixel that was composited in another order.
     pub(super) fn take_ways_of(&mut self, other: Self) {
         self.alternatives.push(other.nominal);
         self.alternatives.extend(other.alternatives);
         self.exhausted |= other.exhausted;
     }
 
-    /// Notes that there are ways which were not followed.
+    /// Notes that some paths were not followed.
     pub(super) fn exhaust(&mut self) {
         self.exhausted = true;
     }
 
-    /// What binary64 says: (C, 1 - T).
+    /// The binary64 result: (C, 1 - T).
     pub fn rgba(&self) -> [f64; 4] {
         self.nominal.rgba()
     }
 
-    /// What the other ways of undecidable decisions give.
+    /// The results of the other paths.
     pub fn alternatives(&self) -> Vec<[f64; 4]> {
         self.alternatives.iter().map(Path::rgba).collect()
     }
 
-    /// Every way, what binary64 says first.
+    /// The outcome of every path, the binary64 one first.
     pub fn outcomes(&self) -> impl Iterator<Item = Outcome> {
         std::iter::once(&self.nominal)
             .chain(&self.alternatives)
             .map(Path::outcome)
     }
 
-    /// Whether some path met more undecidable decisions than are followed.
+    /// True if a path met more undecidable decisions than are followed.
     pub fn is_exhausted(&self) -> bool {
         self.exhausted
     }
@@ -187,7 +187,7 @@ struct Step<'a> {
     depth: f64,
     alpha: Alpha,
     state: &'a OracleState,
-    /// Paths that part from others at this Gaussian, which is already added to them.
+    /// Paths that branch off at this Gaussian, which is already added to them.
     forks: Vec<Path>,
     exhausted: bool,
 }
@@ -201,7 +201,7 @@ impl Step<'_> {
         let floor = f64::from(self.state.alpha_floor);
         let Alpha { value, error } = self.alpha;
         let contributes = value >= floor;
-        // No alpha is below a floor of 0, whatever its error.
+        // With a floor of 0 no alpha is below it, whatever its error.
         let undecidable = floor > 0.0 && (value - floor).abs() < error;
         if let Some(mut other) = self.part(path, undecidable) {
             if !contributes {
@@ -214,13 +214,13 @@ impl Step<'_> {
         }
     }
 
-    /// Step 7's decision: `T (1 - alpha) < transmittanceFloor`, and what follows from it.
+    /// Step 7's decision, `T (1 - alpha) < transmittanceFloor`, and its consequence.
     fn finish_or_blend(&mut self, path: &mut Path) {
         let floor = f64::from(self.state.transmittance_floor);
         let behind = path
             .transmittance
             .behind(self.alpha.value, self.alpha.error);
-        // Where 1 - alpha rounds to 1, T doesn't change, and it has passed this test before.
+        // If 1 - alpha rounds to 1, T does not change, and it has passed this test before.
         let undecidable = floor > 0.0
             && self.alpha.value > 0.5 * UNIT_ROUNDOFF
             && (behind.value - floor).abs() < behind.error;

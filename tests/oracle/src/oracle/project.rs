@@ -14,7 +14,7 @@ use super::{
     OracleCamera, OracleGeometry, OracleInstance, OracleOrder, OracleScene, OracleState, SkipReason,
 };
 
-/// Projects Gaussian `index`, or says why it is not drawn.
+/// Projects Gaussian `index`, or returns the reason for which it is not drawn.
 pub fn project(
     scene: &OracleScene,
     camera: &OracleCamera,
@@ -31,7 +31,7 @@ pub fn project(
     let t = transform(&rotation, offset);
     let depth = depth_variable(camera.model, t);
     let z = depth as f32;
-    // A depth that is not a number passes neither.
+    // NaN fails both comparisons.
     let (beyond_near, before_far) = (camera.near < z, z < camera.far);
     if !beyond_near {
         return Err(SkipReason::Near);
@@ -100,7 +100,8 @@ pub fn project(
     let direction = toward.map(|c| c / length(toward));
     let color = spherical_harmonics::color(scene.degree(), direction, scene.coefficients(index));
 
-    // What a model matrix's products and sums lose; a difference of two numbers alone is rounded once.
+    // The rounding errors of a model matrix's products and sums. Without a matrix there is only a difference, rounded
+    // once.
     let instance = scene.instance(index);
     let lost = if instance == OracleInstance::default() {
         0.0
@@ -152,7 +153,7 @@ fn area(columns: &[[f64; 2]]) -> f64 {
     sum.sqrt()
 }
 
-/// The scales that are read.
+/// The three scales; the third is 0 for a disc.
 fn scales(scene: &OracleScene, state: &OracleState, index: usize) -> [f32; 3] {
     let [x, y, z] = scene.scales[index];
     match state.geometry {
@@ -161,7 +162,7 @@ fn scales(scene: &OracleScene, state: &OracleState, index: usize) -> [f32; 3] {
     }
 }
 
-/// Step 1: what is known without a camera.
+/// Step 1: the checks that need no camera.
 fn check_attributes(
     scene: &OracleScene,
     state: &OracleState,
@@ -215,10 +216,10 @@ fn rotation_matrix(quaternion: [f64; 4]) -> [f64; 9] {
     ]
 }
 
-/// Whether the binary64 error of what a Gaussian is sorted by reaches across the middle between two binary32 values.
+/// True if the binary64 error of the sort value reaches across the midpoint of two binary32 values.
 ///
 /// Camera coordinates are sums of three products of differences: five roundings at most on each term. A length adds
-/// three more, and errs by no more than the vector.
+/// three more, and its error is at most that of the vector.
 fn key_is_undecidable(rotation: &[f64; 9], offset: [f64; 3], lost: f64, sort_by: f64) -> bool {
     let magnitude = |row: usize| -> f64 {
         (0..3)

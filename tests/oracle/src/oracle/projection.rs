@@ -1,10 +1,10 @@
-//! Cameras: where a point is in the picture, and how that moves with the point.
+//! Projections of the camera models: the position of a point in the picture and its Jacobian.
 
 use super::panorama;
 use super::vectors::{dot, length};
 use super::{OracleCamera, OracleModel};
 
-/// The mean of a camera's picture of a point in camera axes, and the Jacobian there.
+/// The image position of a point in camera axes, and the Jacobian of the projection there.
 pub(super) fn mean_and_jacobian(camera: &OracleCamera, t: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
     match camera.model {
         OracleModel::Pinhole => pinhole(camera, t),
@@ -22,7 +22,7 @@ pub(super) fn depth_variable(model: OracleModel, t: [f64; 3]) -> f64 {
     }
 }
 
-/// The mean and the Jacobian of perspective, whose point is kept near the viewport.
+/// The mean and the Jacobian of perspective. The point is clamped to the viewport and a margin.
 fn pinhole(camera: &OracleCamera, t: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
     let [fx, fy] = camera.focal.map(f64::from);
     let [cx, cy] = camera.principal.map(f64::from);
@@ -56,7 +56,7 @@ fn fisheye(camera: &OracleCamera, t: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
     let angle = r.atan2(t[2]);
     let focal = camera.focal.map(f64::from);
     let principal = camera.principal.map(f64::from);
-    // On the axis the limits: nothing moves but across it, by 1 / t.z.
+    // On the axis the limits hold: only movement across the axis counts, by 1 / t.z.
     if r == 0.0 {
         let scale = if t[2] > 0.0 { 1.0 / t[2] } else { f64::NAN };
         return (
@@ -65,7 +65,7 @@ fn fisheye(camera: &OracleCamera, t: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
         );
     }
     let row = |axis: usize| {
-        // The place is f (a / r) t[axis]; a / r has the gradient (a' r - a r') / r^2.
+        // The position is f (a / r) t[axis]; a / r has the gradient (a' r - a r') / r^2.
         let gradient: [f64; 3] = std::array::from_fn(|k| {
             let r_k = if k < 2 { t[k] / r } else { 0.0 };
             let a_k = if k < 2 {

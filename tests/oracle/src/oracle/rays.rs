@@ -1,6 +1,6 @@
-//! The per-pixel order: depths along a pixel's ray ([`own_axes`](super::own_axes)), and which orders they allow.
+//! The per-pixel order: depths along a pixel's ray ([`own_axes`](super::own_axes)) and the orders that they allow.
 //!
-//! Where an honest binary64 implementation may round to another number, neighbours whose order that decides are
+//! If a correct binary64 implementation may round two depths so that neighbours change places, the order is
 //! undecidable, and the reference follows both orders.
 
 use super::own_axes::RayDepth;
@@ -12,7 +12,7 @@ pub fn rounded(depth: f64) -> f64 {
     f64::from_bits(bits & !0xFFFF) + 0.0
 }
 
-/// Composites what reaches a pixel in every order that its depths allow: what binary64 says first, then the others.
+/// Composites the Gaussians that reach a pixel in every order that their depths allow, the binary64 order first.
 ///
 /// `reached` is in the order of the draw; `add` adds one of it to a pixel.
 pub(super) fn composite<T>(reached: &[(RayDepth, T)], add: impl Fn(&mut Pixel, &T)) -> Pixel {
@@ -46,12 +46,12 @@ pub(super) fn composite<T>(reached: &[(RayDepth, T)], add: impl Fn(&mut Pixel, &
     pixel
 }
 
-/// Whether of two neighbours the second may come first.
+/// True if the second of two neighbours may come first.
 fn may_swap<T>(reached: &[(RayDepth, T)], first: usize, second: usize) -> bool {
     let greatest = |depth: &RayDepth| rounded(depth.value + depth.error);
     let least = |depth: &RayDepth| rounded(depth.value - depth.error);
     let (latest, earliest) = (greatest(&reached[first].0), least(&reached[second].0));
-    // Equal ones are in the order of the draw.
+    // Equal depths are in the order of the draw.
     earliest < latest || earliest == latest && second < first
 }
 
@@ -80,9 +80,9 @@ mod tests {
         let step = 2.0f64.powi(-36);
         let swap = |a: f64, b: f64| may_swap(&[(depth(a), ()), (depth(b), ())], 0, 1);
         assert!(!swap(1.0, 2.0));
-        // Equal for certain: the order of the draw.
+        // The depths are certainly equal: the order of the draw.
         assert!(!swap(1.0, 1.0));
-        // Either may round to the next number; where only the first may, they are equal at most.
+        // Either may round to the next number. If only the first may, the depths are equal at most.
         assert!(swap(1.0 + 0.5 * step, 1.0 + 0.5 * step));
         assert!(!swap(1.0 + 0.5 * step, 1.0 + 0.6 * step));
         assert!(!swap(1.0, 1.0 + 0.5 * step));

@@ -1,4 +1,4 @@
-//! Whole images: every Gaussian at every pixel, or only where it can matter.
+//! Whole images: every Gaussian at every pixel, or only at the pixels that it can reach.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -11,18 +11,18 @@ use super::rays;
 use super::splat::Splat;
 use super::{OracleCamera, OracleOrder, OracleScene, OracleState, SkipCounts, SkipReason};
 
-/// How far beyond the ellipse on which alpha reaches its floor [`render_bounded`] looks, in px.
-/// It covers the rounding of the bound itself.
+/// The margin, in px, that [`render_bounded`] adds around the ellipse on which alpha reaches its floor. It covers the
+/// rounding of the bound itself.
 const MARGIN: f64 = 2.0;
 
-/// What a draw means: an image, and where it could mean something else.
+/// The reference picture of a draw: the binary64 image and all other outcomes of its undecidable pixels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reference {
     /// Width in pixels.
     pub width: u32,
     /// Height in pixels.
     pub height: u32,
-    /// What binary64 says, (C, 1 - T) premultiplied, row by row from the top.
+    /// The binary64 result, (C, 1 - T) premultiplied, row by row from the top.
     pub nominal: Vec<[f64; 4]>,
     /// The further outcomes of undecidable pixels, by index into `nominal`.
     pub alternatives: BTreeMap<usize, Vec<[f64; 4]>>,
@@ -30,12 +30,12 @@ pub struct Reference {
     pub exhausted: usize,
     /// Gaussians that were not drawn.
     pub skips: SkipCounts,
-    /// Gaussians that were drawn and whose depth key could be the next one, too.
+    /// Drawn Gaussians whose depth key could also be the next number.
     pub undecidable_keys: usize,
 }
 
 impl Reference {
-    /// Every outcome of pixel `index`, what binary64 says first.
+    /// Every outcome of pixel `index`, the binary64 result first.
     pub fn outcomes(&self, index: usize) -> impl Iterator<Item = &[f64; 4]> {
         let alternatives = self.alternatives.get(&index).map_or(&[][..], Vec::as_slice);
         std::iter::once(&self.nominal[index]).chain(alternatives)
@@ -52,7 +52,7 @@ impl Reference {
         })
     }
 
-    /// Every outcome over (by `ONE`, `ONE_MINUS_SRC_ALPHA`) what is behind its pixel.
+    /// Every outcome blended (`ONE`, `ONE_MINUS_SRC_ALPHA`) over `behind`, the pixels behind it.
     #[must_use]
     pub fn over(&self, behind: &[[f64; 4]]) -> Self {
         let blend = |index: usize, rgba: &[f64; 4]| {
@@ -82,7 +82,7 @@ impl Reference {
     }
 }
 
-/// Draws every Gaussian at every pixel: the meaning itself, for small scenes.
+/// Draws every Gaussian at every pixel: the definition itself, for small scenes.
 pub fn render_literal(
     scene: &OracleScene,
     camera: &OracleCamera,
@@ -109,8 +109,7 @@ pub fn render_literal(
 
 /// Draws every Gaussian where its alpha can reach the floor, rows in parallel.
 ///
-/// Gives the same bits as [`render_literal`]: what is left out has an alpha that is decidably
-/// below the floor.
+/// Gives the same bits as [`render_literal`]: the alphas that it skips are certainly below the floor.
 pub fn render_bounded(
     scene: &OracleScene,
     camera: &OracleCamera,
@@ -136,7 +135,7 @@ pub(super) fn bounded(projected: &Projected, size: [u32; 2], state: &OracleState
     collect(size, projected, || rows.iter().flatten())
 }
 
-/// Where each splat's alpha can reach the floor.
+/// The bounds within which each splat's alpha can reach the floor.
 fn bounds(projected: &Projected, state: &OracleState) -> Vec<Bound> {
     let splats = projected.splats.iter();
     splats.map(|splat| Bound::new(splat, state)).collect()
@@ -207,7 +206,7 @@ fn render_per_pixel(
     collect([camera.width, camera.height], projected, || pixels.iter())
 }
 
-/// The Gaussians that are drawn, nearest first, and a tally of the others.
+/// The Gaussians that are drawn, nearest first, and the counts of the others.
 pub(super) struct Projected {
     pub(super) splats: Vec<Splat>,
     skips: SkipCounts,
@@ -218,7 +217,7 @@ impl Projected {
         Self::sort((0..scene.len()).map(|index| project(scene, camera, state, index)))
     }
 
-    /// What is drawn of Gaussians in primitive order, sorted.
+    /// The drawable Gaussians of `all`, sorted. `all` is in primitive order.
     pub(super) fn sort(all: impl Iterator<Item = Result<Splat, SkipReason>>) -> Self {
         let mut skips = SkipCounts::default();
         let mut splats = Vec::new();
@@ -258,23 +257,23 @@ pub(super) fn collect<'a, I: Iterator<Item = &'a Pixel>>(
     }
 }
 
-/// The ellipse outside which a Gaussian's alpha is decidably below the floor.
+/// The ellipse outside which a Gaussian's alpha is certainly below the floor.
 pub(super) struct Bound {
     mean: [f64; 2],
     covariance: [f64; 3],
     determinant: f64,
-    /// Whether it has copies beside it.
+    /// True if the picture repeats, so that the Gaussian has copies to the left and right.
     repeats: bool,
-    /// The quadratic form on the ellipse; negative if there is none, infinite if it is the plane.
+    /// The quadratic form on the ellipse; negative if there is no ellipse, infinite if the whole plane is inside.
     q: f64,
-    /// Of a disc: left, right, top and bottom instead.
+    /// For a disc: left, right, top and bottom, in place of the ellipse.
     rectangle: Option<[f64; 4]>,
 }
 
 impl Bound {
     pub(super) fn new(splat: &Splat, state: &OracleState) -> Self {
-        // Undecidable or better needs opacity exp(-q / 2) (1 + error) >= floor, hence
-        // q <= level + 2 ln(1 + error). The error is at most 1, which bounds q, which bounds it.
+        // A pixel can only count if opacity exp(-q / 2) (1 + error) >= floor, hence q <= level + 2 ln(1 + error). The
+        // error is at most 1, which bounds q; that q in turn bounds the error.
         let level = 2.0 * (splat.opacity / f64::from(state.alpha_floor)).ln();
         let furthest = (level + 2.0 * std::f64::consts::LN_2).max(0.0);
         let error = splat

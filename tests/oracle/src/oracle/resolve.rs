@@ -1,4 +1,4 @@
-//! What a resolve shader reads of a pixel, in its literal form.
+//! The inputs of a resolve shader at a pixel, computed in their literal form.
 
 use super::OracleState;
 use super::pixel::{Outcome, Pixel};
@@ -8,18 +8,18 @@ use super::shaded::{OracleOutputs, OracleViewport, project};
 use super::splat::Splat;
 use super::{OracleCamera, OracleScene};
 
-/// One way in which a pixel may come about.
+/// One possible result of a pixel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Resolved {
     /// (C, 1 - T).
     pub accumulated: [f64; 4],
-    /// Whether a Gaussian contributed, so that there is a fragment.
+    /// True if a Gaussian contributed, so that there is a fragment.
     pub covered: bool,
     /// The mean of the contributing centres' depths, weighted by T alpha.
     pub expected_depth: f64,
-    /// Every median depth that it may have.
+    /// The possible median depths.
     pub median_depths: Vec<f64>,
-    /// Whether those are not all.
+    /// True if the list of medians is incomplete.
     pub medians_exhausted: bool,
 }
 
@@ -42,8 +42,7 @@ impl Resolved {
     }
 }
 
-/// Every way in which each pixel may come about, what binary64 says first. `depth` is a centre's depth, of the depth
-/// variable.
+/// The possible results of each pixel, the binary64 one first. `depth` gives a centre's depth from the depth variable.
 fn resolve(
     mut projected: Projected,
     size: [u32; 2],
@@ -62,7 +61,7 @@ fn resolve(
     pixels.iter().flatten().map(ways).collect()
 }
 
-/// What a resolve shader reads after fixed-function projection. Of `tests` only how depths come about counts.
+/// The resolve shader's inputs after fixed-function projection. Of `tests` only the conversion to depths is used.
 pub fn resolve_scene(
     scene: &OracleScene,
     camera: &OracleCamera,
@@ -74,7 +73,8 @@ pub fn resolve_scene(
     resolve(projected, [camera.width, camera.height], state, depth)
 }
 
-/// What it reads after vertex-shader projection, with a viewport of depths from 0 to 1 and a depth of binary32.
+/// The resolve shader's inputs after vertex-shader projection, with a viewport of depths from 0 to 1 and binary32
+/// depths.
 pub fn resolve_shaded(
     outputs: &[OracleOutputs],
     size: [u32; 2],

@@ -1,7 +1,7 @@
 //! Depth and stencil tests of a draw, sample by sample, in their literal form.
 //!
-//! Depths here are the numbers that the attachment's format holds ([`OracleDepthFormat::code`]). What a sample stores
-//! before the draw is given; nothing that the draw does is seen by its own tests.
+//! Depths here are the numbers that the attachment's format holds ([`OracleDepthFormat::code`]). The caller gives the
+//! values that a sample holds before the draw. The draw's own writes do not affect its tests.
 
 use ash::vk;
 use rayon::prelude::*;
@@ -13,7 +13,7 @@ use super::render::{Bound, Projected, Reference, collect};
 use super::splat::{Alpha, Splat};
 use super::{OracleCamera, OracleModel, OracleOrder, OracleScene, OracleState};
 
-/// How a depth attachment holds depths.
+/// The format of a depth attachment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OracleDepthFormat {
     /// An integer of this many bits, of which the greatest is 1.
@@ -41,10 +41,11 @@ impl OracleDepthFormat {
     }
 }
 
-/// The stencil state of front faces; each of the operations is applied where it says.
+/// The stencil state of front faces. Each operation is applied in the case that its name says.
 #[derive(Clone, Copy, Debug)]
 pub struct OracleStencil {
-    /// The reference is compared with what is stored, both masked.
+    /// The operations, the comparison, the masks and the reference. The comparison is between the masked reference and
+    /// the masked stored value.
     pub state: vk::StencilOpState,
 }
 
@@ -75,16 +76,16 @@ impl OracleStencil {
     }
 }
 
-/// What is tested of a draw, and how its depths come about.
+/// The tests of a draw, and the mapping to depths.
 #[derive(Clone, Copy, Debug)]
 pub struct OracleTests {
     /// The camera's `depthCoefficients`.
     pub depth_coefficients: [f32; 2],
     /// The viewport's depths of 0 and of 1.
     pub depth_range: [f32; 2],
-    /// How the attachment holds depths.
+    /// The attachment's depth format.
     pub format: OracleDepthFormat,
-    /// The comparison, and whether depth is written.
+    /// The comparison, and true if depth is written.
     pub depth: Option<(vk::CompareOp, bool)>,
     /// The least and the greatest stored depth.
     pub bounds: Option<[f32; 2]>,
@@ -124,7 +125,7 @@ pub fn compare<T: PartialOrd>(op: vk::CompareOp, reference: T, stored: T) -> boo
     }
 }
 
-/// What one sample of each pixel stores.
+/// The stored values of one sample of each pixel.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Stored {
     /// Numbers of depths.
@@ -133,12 +134,12 @@ pub struct Stored {
     pub stencil: Vec<u8>,
 }
 
-/// What a draw makes of one sample of each pixel.
+/// The results of a draw at one sample of each pixel.
 #[derive(Clone, Debug)]
 pub struct TestedReference {
     /// Its colours.
     pub color: Reference,
-    /// Every depth that it may store afterwards, what binary64 says among them; `None` where that is not known.
+    /// Every depth that it may store afterwards, the binary64 one among them; `None` if that is not known.
     pub depth: Vec<Option<Vec<u32>>>,
     /// Every stencil that it may store afterwards.
     pub stencil: Vec<Vec<u8>>,
@@ -149,13 +150,13 @@ pub struct TestedReference {
 /// One sample while Gaussians are added to it.
 struct Sample<'a> {
     pixel: Pixel,
-    /// In the per-pixel order, what has passed and is yet to be put into order.
+    /// In the per-pixel order: the Gaussians that have passed and are not sorted yet.
     passed: Vec<(RayDepth, (&'a Splat, Alpha))>,
     stored: (u32, u8),
-    /// Whether depth bounds and stencil let it pass.
+    /// True if depth bounds and stencil let it pass.
     candidate: bool,
     stencil_passes: bool,
-    /// Whether an alpha reached the floor for certain, and perhaps.
+    /// True if an alpha certainly reached the floor, and if one may have reached it.
     reached: [bool; 2],
 }
 
@@ -179,14 +180,14 @@ impl Sample<'_> {
         }
     }
 
-    /// Notes whether a Gaussian reaches the pixel at all.
+    /// Notes if a Gaussian reaches the pixel at all.
     fn reach(&mut self, alpha: Alpha, state: &OracleState) {
         let floor = f64::from(state.alpha_floor);
         self.reached[0] |= floor == 0.0 || alpha.value - alpha.error >= floor;
         self.reached[1] |= alpha.value + alpha.error >= floor;
     }
 
-    /// What it may store afterwards: depths, if that is known, and stencils.
+    /// The values that it may store afterwards: depths, if known, and stencils.
     fn after(&self, tests: &OracleTests, code: impl Fn(f32) -> u32) -> (Option<Vec<u32>>, Vec<u8>) {
         let writes = tests.depth.is_some_and(|(_, write)| write);
         let (mut depths, mut stencils) = (Some(Vec::new()), Vec::new());

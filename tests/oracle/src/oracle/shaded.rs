@@ -1,4 +1,4 @@
-//! Vertex-shader projection: from what a shader wrote of a Gaussian to the numbers that a pixel needs.
+//! Vertex-shader projection: from a vertex shader's outputs for a Gaussian to the numbers that a pixel needs.
 
 use super::error_model::ErrorModel;
 use super::own_axes::OwnAxes;
@@ -6,7 +6,7 @@ use super::render::{Projected, Reference, bounded};
 use super::splat::{Cholesky, Splat};
 use super::{OracleOrder, OracleState, SkipReason};
 
-/// What a vertex shader wrote of one Gaussian.
+/// A vertex shader's outputs for one Gaussian.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OracleOutputs {
     /// `gl_Position`.
@@ -30,7 +30,7 @@ pub struct OracleViewport {
     pub size: [f32; 2],
 }
 
-/// Projects what a shader wrote, or says why it is not drawn.
+/// Projects a shader's outputs, or returns the reason for which the Gaussian is not drawn.
 pub fn project(
     outputs: &OracleOutputs,
     viewport: &OracleViewport,
@@ -49,7 +49,7 @@ pub fn project(
     if outputs.opacity < state.alpha_floor {
         return Err(SkipReason::OpacityBelowFloor);
     }
-    // The clip volume, of depth alone.
+    // The clip volume limits depth alone.
     if w <= 0.0 || z < 0.0 {
         return Err(SkipReason::Near);
     }
@@ -89,7 +89,7 @@ pub fn project(
         color: outputs.color.map(f64::from),
         key: match state.order {
             OracleOrder::Primitive | OracleOrder::PerPixel => 0.0,
-            // Zero has no sign here.
+            // Adding 0 makes a negative zero positive.
             OracleOrder::ViewDepth | OracleOrder::RadialDistance => key + 0.0,
         },
         z: (z / w) as f32,
@@ -103,7 +103,7 @@ pub fn project(
     })
 }
 
-/// Draws what a shader wrote of the Gaussians of a draw, in primitive order, to a framebuffer that the viewport covers.
+/// Draws a shader's outputs for the Gaussians of a draw, in primitive order, to a framebuffer that the viewport covers.
 pub fn render_shaded(
     outputs: &[OracleOutputs],
     size: [u32; 2],

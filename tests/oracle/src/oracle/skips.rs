@@ -1,7 +1,7 @@
-//! Gaussians that are not drawn, and why.
+//! Gaussians that are not drawn, and the reasons.
 
-/// Why a Gaussian is not drawn at all. A Gaussian is counted under the first reason that holds,
-/// in this order.
+/// The reason for which a Gaussian is not drawn at all. A Gaussian is counted under the first reason that holds, in
+/// this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SkipReason {
     /// A position, scale, quaternion, opacity or coefficient of the drawn degree is not finite.
@@ -20,7 +20,7 @@ pub enum SkipReason {
     DegenerateCovariance,
 }
 
-/// How many Gaussians were skipped, by the first reason that holds.
+/// The number of skipped Gaussians by the first reason that holds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[allow(missing_docs, reason = "the fields are the reasons of `SkipReason`")]
 pub struct SkipCounts {
@@ -47,7 +47,7 @@ impl SkipCounts {
         } += 1;
     }
 
-    /// All that were skipped.
+    /// The number of all skipped Gaussians.
     pub fn total(&self) -> usize {
         self.non_finite
             + self.zero_quaternion

@@ -4,14 +4,14 @@
 //! to l, and the Condon-Shortley phase is kept, so the functions of odd m have a minus sign:
 //! degree 1 is `-y, z, -x`.
 
-/// How many coefficients a colour channel has up to `degree`.
+/// The number of coefficients that a colour channel has up to `degree`.
 pub fn coefficient_count(degree: u32) -> usize {
     (degree as usize + 1).pow(2)
 }
 
 /// The first `(degree + 1)^2` basis functions at the unit vector `direction`; the rest are 0.
 ///
-/// Degrees above 4 give what 4 gives.
+/// Degrees above 4 are treated as 4.
 pub fn basis(degree: u32, direction: [f64; 3]) -> [f64; 25] {
     let [x, y, z] = direction;
     let (xx, yy, zz) = (x * x, y * y, z * z);
@@ -110,8 +110,8 @@ mod tests {
 
     #[test]
     fn signs_and_order_are_those_of_3dgs() {
-        // Each function where it is easy to tell apart: the sign at a direction in the octant
-        // where x > y > z > 0, which the Condon-Shortley phase decides.
+        // Each function is tested in a direction that tells it from the others: its sign in the octant where x > y > z
+        // > 0, which the Condon-Shortley phase decides.
         let d = [0.8, 0.52, (1.0_f64 - 0.64 - 0.2704).sqrt()];
         let signs: Vec<f64> = basis(3, d)[..16].iter().map(|b| b.signum()).collect();
         assert_eq!(signs[..4], [1.0, -1.0, 1.0, -1.0]);

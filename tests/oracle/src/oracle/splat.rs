@@ -6,7 +6,7 @@ use super::own_axes::OwnAxes;
 use super::panorama;
 use super::surfel::Surfel;
 
-/// A Gaussian as the pixels see it.
+/// A Gaussian after projection, as step 6 needs it.
 #[derive(Clone, Copy, Debug)]
 pub struct Splat {
     /// Centre in pixels from the viewport's upper left corner, not clamped to it.
@@ -15,34 +15,34 @@ pub struct Splat {
     pub covariance: [f64; 3],
     /// Its determinant, evaluated without cancellation.
     pub determinant: f64,
-    /// After how many pixels the picture repeats to the right and to the left, or infinity.
+    /// The number of pixels after which the picture repeats to the right and to the left, or infinity.
     pub period: f64,
     /// The factor with which the quadratic form is evaluated.
     pub cholesky: Cholesky,
-    /// Opacity, compensated if the state says so.
+    /// Opacity, after compensation if the state asks for it.
     pub opacity: f64,
     /// Colour, at least 0.
     pub color: [f64; 3],
-    /// What it is sorted by, rounded to binary32.
+    /// The value by which it is sorted, rounded to binary32.
     pub key: f32,
     /// The depth variable, rounded to binary32. (With vertex-shader projection the depth, rounded so.)
     pub z: f32,
-    /// The depth of its centre, of which a pixel has a mean; zero until somebody asks for that.
+    /// The depth of its centre, which enters the mean depth of a pixel; zero unless the depth is needed.
     pub depth: f64,
-    /// What it is in space, if that is a disc.
+    /// Its disc in camera axes, if it is a disc.
     pub surfel: Option<Surfel>,
-    /// What its depth along rays comes from.
+    /// The source of its depths along rays.
     pub own_axes: OwnAxes,
-    /// Whether the key is within its own error of the middle between two keys.
+    /// True if the key is within its own error of the midpoint of two keys.
     pub key_undecidable: bool,
-    /// How far a binary32 implementation may err on this Gaussian.
+    /// The bound on the error of a binary32 implementation for this Gaussian.
     pub error: ErrorModel,
 }
 
 /// Lower triangular factor of a 2x2 covariance, pivoted on its larger diagonal element.
 #[derive(Clone, Copy, Debug)]
 pub struct Cholesky {
-    /// Whether y comes first.
+    /// True if y comes first.
     pub swapped: bool,
     /// The factor's elements `l11, l21, l22`.
     pub l: [f64; 3],
@@ -82,7 +82,7 @@ impl Cholesky {
 pub struct Alpha {
     /// Step 6's value, ceiling applied.
     pub value: f64,
-    /// How far a binary32 implementation may be from it.
+    /// The bound on the distance of a binary32 implementation from it.
     pub error: f64,
 }
 

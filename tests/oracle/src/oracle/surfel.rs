@@ -1,17 +1,17 @@
-//! 2D Gaussians: where a pixel's ray meets a disc's plane.
+//! 2D Gaussians: the intersection of a pixel's ray with a disc's plane.
 //!
-//! In camera axes a disc has the scaled axes `a` and `b` and the centre `t`. A ray from `g` along `r` meets its plane where
-//! `u a + v b + t - g = tau r`: by Cramer's rule `u = ((b x t') . r) / w`, `v = ((t' x a) . r) / w`,
-//! `tau = ((a x b) . t') / w`, `w = (a x b) . r`, `t' = t - g`. The squared distance is `u^2 + v^2` where the ray meets the
-//! plane (for a pinhole: at `tau > nearPlane`), or the filter's `|x - mean|^2 / lowPass` if that is less.
+//! In camera axes a disc has the scaled axes `a` and `b` and the centre `t`. A ray from `g` along `r` meets its plane
+//! where `u a + v b + t - g = tau r`: by Cramer's rule `u = ((b x t') . r) / w`, `v = ((t' x a) . r) / w`, `tau = ((a x
+//! b) . t') / w`, `w = (a x b) . r`, `t' = t - g`. The squared distance is `u^2 + v^2` where the ray meets the plane
+//! (for a pinhole: at `tau > nearPlane`), or the filter's `|x - mean|^2 / lowPass` if that is less.
 
 use super::error_model::UNIT_ROUNDOFF;
 use super::{OracleCamera, OracleModel};
 
-/// Roundings of binary64 granted to the numerators and to `w`.
+/// Number of binary64 roundings allowed for the numerators and for `w`.
 const ROUNDINGS: f64 = 64.0;
 
-/// A disc before a camera.
+/// A disc in camera axes.
 #[derive(Clone, Copy, Debug)]
 pub struct Surfel {
     pub(super) camera: OracleCamera,
@@ -23,7 +23,7 @@ pub struct Surfel {
     pub(super) mean: [f64; 2],
     /// The filter's variance.
     pub(super) low_pass: f64,
-    /// Relative error of alpha that every disc is granted.
+    /// Relative error of alpha that is allowed for every disc.
     pub(super) fixed: f64,
 }
 
@@ -65,7 +65,7 @@ impl Surfel {
         } else {
             (f64::INFINITY, 0.0)
         };
-        // The exponent is rounded once, and once more where it is put together.
+        // The exponent is rounded once, and once more when its parts are added.
         let rounding = UNIT_ROUNDOFF * (self.fixed + 4.0 * distance.min(1e4));
         (distance, (rounding + 0.5 * error).min(1.0))
     }

@@ -5,18 +5,19 @@ use super::vectors::{cross, dot, length};
 use super::{OracleCamera, OracleModel, panorama};
 use std::f64::consts::{FRAC_PI_2, PI};
 
-/// Dimensions of what is projected.
+/// Number of dimensions of the space that is projected.
 const N: f64 = 3.0;
 /// The transform's parameters.
 const ALPHA: f64 = 1.0;
 const BETA: f64 = 2.0;
 const KAPPA: f64 = 0.0;
 
-/// Points in the picture, less their mean, each times the root of its weight; the covariance is the sum of their squares.
+/// Points in the picture, less their mean, each times the root of its weight; the covariance is the sum of their
+/// squares.
 pub type Deviations = Vec<[f64; 2]>;
 
-/// The mean of the picture of a Gaussian at `t` with these axes (each as long as a standard deviation), all in camera axes,
-/// and its deviations; nothing if some sigma point is not seen beside the mean.
+/// The mean of the picture of a Gaussian at `t` with these axes (each as long as a standard deviation), all in camera
+/// axes, and its deviations. `None` if a sigma point is not visible together with the mean.
 pub fn transform(
     camera: &OracleCamera,
     t: [f64; 3],
@@ -68,9 +69,9 @@ pub fn transform(
     Some((mean, deviations.collect()))
 }
 
-/// Whether a sigma point of a Gaussian at `t` is seen beside it: beyond the near plane; by a fisheye, less than a right
-/// angle away, with what is straight behind outside of the cone of that angle about `t`; by a panorama, with the poles
-/// outside of that cone.
+/// True if a sigma point of a Gaussian at `t` is visible together with it. It must be beyond the near plane. For a
+/// fisheye it must be less than a right angle away, and the backward axis must be outside the cone of that angle about
+/// `t`. For a panorama the poles must be outside that cone.
 fn is_seen(camera: &OracleCamera, t: [f64; 3], point: [f64; 3]) -> bool {
     let cosine = dot(t, point);
     let sine = length(cross(t, point));

@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 /// One Gaussian of a [`Scene`].
 type Gaussian = ([f32; 3], GaussianShape, Vec<[f32; 3]>);
 
-/// `scene` with each Gaussian, of the index given, changed by `change`.
+/// `scene` with each Gaussian changed by `change`, which is also given its index.
 fn mapped(scene: &Scene, mut change: impl FnMut(usize, &mut Gaussian)) -> Scene {
     let mut made = Scene::with_capacity(scene.sh_degree(), scene.len());
     let coefficients = scene.sh().chunks(scene.sh_stride());
@@ -67,7 +67,7 @@ pub fn view_independent(scene: &Scene) -> Scene {
     mapped(scene, |_, (_, _, sh)| sh[1..].fill([0.0; 3]))
 }
 
-/// `scene` with `share` of its Gaussians, spread evenly, far away from where it was.
+/// `scene` with `share` of its Gaussians, spread evenly, moved far away.
 #[must_use]
 pub fn partly_moved_away(scene: &Scene, share: f64) -> Scene {
     mapped(scene, |index, (position, _, _)| {

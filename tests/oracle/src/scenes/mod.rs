@@ -1,5 +1,4 @@
-//! Generated scenes, the same for the same seed: what tests and benchmarks draw when they need no
-//! file.
+//! Generated scenes for tests and benchmarks that need no file. The same seed gives the same scene.
 
 mod edit;
 mod synthetic;
@@ -187,7 +186,7 @@ pub fn awkward(seed: u64, count: usize, degree: u32) -> SceneBuffers {
     SceneBuffers::new(degree, gaussians)
 }
 
-/// Any direction in four dimensions, any length: files don't normalise them either.
+/// A random direction in four dimensions, of a random length: quaternions in files are not normalised either.
 fn quaternion(rng: &mut ChaCha8Rng) -> [f32; 4] {
     std::array::from_fn(|_| rng.random_range(-2.0..2.0))
 }

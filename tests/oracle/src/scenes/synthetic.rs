@@ -54,7 +54,7 @@ pub fn synthetic_camera([width, height]: [u32; 2]) -> Camera {
 
 fn position(rng: &mut ChaCha8Rng) -> [f64; 3] {
     let mut within = |side: f64| side * (rng.random::<f64>() - 0.5);
-    // The choice is made first, so that its number is the first of each Gaussian.
+    // The choice is made first, so that it uses the first random number of each Gaussian.
     match within(1.0) + 0.5 {
         ..0.35 => {
             let y = within(2.0);

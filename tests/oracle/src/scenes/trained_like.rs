@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use gaurast_scene::random::normal;
 use gaurast_scene::{Camera, GaussianShape, SH_C0, Scene, sigmoid};
 
-/// Gaussians of the object and of the ground, of a hundred; the others are background.
+/// The percentage of Gaussians that belong to the object, and to the ground. The others are background.
 const OBJECT: u32 = 30;
 const GROUND: u32 = 40;
 const DENSE: u32 = OBJECT + GROUND;
@@ -60,7 +60,7 @@ pub fn trained_like(seed: u64, count: usize, cameras: &[Camera]) -> Scene {
     scene
 }
 
-/// Where cameras are and look.
+/// The positions and viewing directions of the cameras.
 struct Surroundings {
     middle: DVec3,
     /// The cameras' usual distance from the middle.
@@ -89,7 +89,7 @@ impl Surroundings {
         let middle = if matrix.determinant().abs() > 1e-9 {
             matrix.inverse() * sum
         } else {
-            // One line of sight alone.
+            // All lines of sight are parallel, as with one camera: the point 4 units in front of the first is taken.
             DVec3::from_array(cameras[0].eye) + 4.0 * DVec3::from_array(cameras[0].rotation[2])
         };
         let mut distances: Vec<f64> = eyes().map(|eye| eye.distance(middle)).collect();
@@ -115,7 +115,7 @@ fn direction(rng: &mut ChaCha8Rng) -> DVec3 {
     DVec3::new(ring * cos, ring * sin, up)
 }
 
-/// How far apart the points are if `share` of a hundred of `count` lie on `area`.
+/// The distance between neighbouring points if `share` percent of `count` points lie on `area`.
 fn spacing(area: f64, share: u32, count: usize) -> f64 {
     (area * 100.0 / (f64::from(share) * count as f64)).sqrt()
 }

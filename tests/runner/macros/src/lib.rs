@@ -5,11 +5,11 @@ use quote::quote;
 use syn::punctuated::Punctuated;
 use syn::{Expr, ItemFn, Meta, ReturnType, Token, parse_macro_input};
 
-/// Registers a function as a test of the executable that it stands in.
+/// Registers a function as a test of the executable that contains it.
 ///
 /// The function takes nothing or a `&Case`, and returns nothing. Arguments, in any order:
 ///
-/// - `needs = EXPRESSION`: an array of `Need`s. The test is ignored where one of them is missing.
+/// - `needs = EXPRESSION`: an array of `Need`s. The test is ignored if one of them is missing.
 /// - `each = EXPRESSION`: a `Vec<Variant>`. The test runs once for each variant, which `Case::variant` names.
 /// - `alone`: the test runs in a process of its own.
 #[proc_macro_attribute]

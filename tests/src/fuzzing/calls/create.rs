@@ -1,4 +1,4 @@
-//! Calls that create objects and map memory. `unsafe` as in the module above.
+//! Calls that create objects and map memory. The safety of `unsafe` is explained in the parent module.
 
 use ash::vk;
 use gaurast::vk::{
@@ -255,13 +255,13 @@ pub(super) fn map(run: &mut Run, bytes: &mut Bytes<'_>) {
     };
     let (handle, memory) = (buffer.handle, buffer.memory);
     let (offset, size) = (bytes.long(5000), bytes.long(5000));
-    // SAFETY: see above; what is written lies in the mapped range.
+    // SAFETY: see above; the written bytes are in the mapped range.
     unsafe {
         let mapped = run
             .device
             .map_memory(memory, offset, size, vk::MemoryMapFlags::empty());
         if let Some(mapped) = run.note(mapped) {
-            // The size may say whatever there is.
+            // The given size may be any; the size that the buffer requires is used.
             let whole = run.device.get_buffer_memory_requirements(handle).size;
             let count = size.min(4096).min(whole.saturating_sub(offset)) as usize;
             for at in 0..count {

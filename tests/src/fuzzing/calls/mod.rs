@@ -1,6 +1,6 @@
-//! Vulkan calls in any order and with many values, among them some that valid usage forbids: sizes and offsets that don't
-//! fit, commands where they don't belong, counts of any size. Handles are always live ones of the right kind, pointers
-//! are valid, and nothing is destroyed while it is in use: where those rules are broken, nothing can be promised.
+//! Vulkan calls in any order and with many values. Some of them violate valid usage: sizes and offsets that do not fit,
+//! commands in wrong places, counts of any size. Handles are always valid and of the right type, pointers are valid,
+//! and no object is destroyed while it is in use, because the driver guarantees nothing otherwise.
 
 mod create;
 mod record;
@@ -12,13 +12,13 @@ use run::Run;
 
 pub use run::Ended;
 
-/// Calls of a run at most.
+/// The greatest number of calls of a run.
 const CALLS: usize = 120;
 
-/// Makes the calls that bytes say, on a device of its own.
+/// Makes the calls that `data` encodes, on a device of its own.
 ///
 /// # Panics
-/// If the driver cannot do what doesn't depend on the bytes.
+/// If the driver fails at something that does not depend on `data`.
 pub fn run(data: &[u8]) -> Ended {
     let mut bytes = Bytes::new(data);
     let mut run = Run::new();

@@ -1,4 +1,4 @@
-//! Commands that are recorded. `unsafe` as in the module above.
+//! Commands that are recorded. The safety of `unsafe` is explained in the parent module.
 
 use ash::vk;
 use gaurast::vk::{GaussianCameraGAURAST, GaussianCameraModelGAURAST};
@@ -288,7 +288,7 @@ pub(super) fn clear(run: &mut Run, bytes: &mut Bytes<'_>) {
 }
 
 pub(super) fn draw(run: &mut Run, bytes: &mut Bytes<'_>) {
-    // More is no other than much, but takes long.
+    // Larger counts take long and test nothing more.
     let (count, instances) = (bytes.number(400) % 4000, bytes.number(3) % 5);
     let (first, first_instance) = (bytes.number(30), bytes.number(3));
     let (device, commands) = (&run.device, run.commands);

@@ -1,4 +1,4 @@
-//! A device and what a run has made.
+//! A device and the objects that a run has created.
 
 use ash::vk;
 use gaurast::gaussian_primitive_topology;
@@ -7,7 +7,7 @@ use gaurast_testkit::Messages;
 
 use crate::fuzzing::bytes::Bytes;
 
-/// Objects of a kind at most.
+/// The greatest number of objects of each type.
 pub(super) const OBJECTS: usize = 6;
 pub(super) const FORMATS: [vk::Format; 6] = [
     vk::Format::R32G32B32A32_SFLOAT,
@@ -21,16 +21,16 @@ pub(super) const FORMATS: [vk::Format; 6] = [
 pub(super) const DEPTH_FORMATS: [vk::Format; 2] =
     [vk::Format::D32_SFLOAT, vk::Format::D24_UNORM_S8_UINT];
 
-/// How a run ended.
+/// The result of a run.
 #[derive(Clone, Debug, Default)]
 pub struct Ended {
-    /// Calls that returned success, or nothing.
+    /// Number of calls that returned success or have no result.
     pub succeeded: u32,
-    /// Calls that returned an error.
+    /// Number of calls that returned an error.
     pub failed: u32,
-    /// Submissions that were executed.
+    /// Number of submissions that were executed.
     pub submitted: u32,
-    /// Why the device was lost, if it was.
+    /// The reason for which the device was lost, if it was.
     pub lost: Option<String>,
 }
 
@@ -41,7 +41,7 @@ pub(super) struct Resource<T> {
     pub(super) extent: [u32; 2],
 }
 
-/// A device and what a run has made.
+/// A device and the objects that a run has created.
 pub(super) struct Run {
     instance: ash::Instance,
     pub(super) device: ash::Device,
@@ -56,16 +56,16 @@ pub(super) struct Run {
     pub(super) images: Vec<(Resource<vk::Image>, vk::ImageView)>,
     pub(super) pipelines: Vec<vk::Pipeline>,
     pub(super) ended: Ended,
-    /// Hears why the device is lost, in `messages`.
+    /// A messenger that stores the reason of a device loss in `messages`.
     messenger: vk::DebugUtilsMessengerEXT,
     debug_utils: ash::ext::debug_utils::Instance,
     messages: Box<Messages>,
-    /// Last: it may own the library that all others call.
+    /// Dropped last, because it may own the library of all functions above.
     _entry: ash::Entry,
 }
 
-// `unsafe` here has one reason throughout: these are Vulkan calls whose handles are live and whose pointers are valid,
-// which is all that the driver relies upon; see the module.
+// The reason for all `unsafe` here is the same: these are Vulkan calls with valid handles and valid pointers. The
+// driver relies on nothing else; see the module.
 impl Run {
     pub(super) fn new() -> Self {
         let entry = vulkan_gaurast::entry();
@@ -150,7 +150,7 @@ impl Run {
         }
     }
 
-    /// Counts what a call returned.
+    /// Counts the result of a call.
     pub(super) fn note<T>(&mut self, result: ash::prelude::VkResult<T>) -> Option<T> {
         match result {
             Ok(value) => {
@@ -162,14 +162,14 @@ impl Run {
                 if error == vk::Result::ERROR_DEVICE_LOST && self.ended.lost.is_none() {
                     self.ended.lost = Some(self.reason());
                 }
-                // A defect of the driver, or a handle that it doesn't know.
+                // UNKNOWN means a defect of the driver, or a handle that it does not know.
                 assert_ne!(error, vk::Result::ERROR_UNKNOWN);
                 None
             }
         }
     }
 
-    /// What the driver said of the loss of the device.
+    /// The driver's message about the loss of the device.
     fn reason(&self) -> String {
         let messages = self.messages.take();
         let said = messages.iter().find(|it| it.id == "GAURAST-device-lost");
@@ -177,7 +177,7 @@ impl Run {
     }
 
     pub(super) fn destroy(&mut self, bytes: &mut Bytes<'_>) {
-        // Nothing is in use: submissions are waited for, and what is recorded is made anew.
+        // No object is in use: submissions were waited for, and the command buffer is recorded anew.
         self.reset();
         // SAFETY: see above.
         unsafe {
@@ -232,7 +232,7 @@ impl Run {
     }
 }
 
-/// One of several things, unless there is none.
+/// An element of `all`, or `None` if it is empty.
 pub(super) fn pick<'a, T>(bytes: &mut Bytes<'_>, all: &'a [T]) -> Option<&'a T> {
     (!all.is_empty()).then(|| &all[bytes.below(all.len())])
 }

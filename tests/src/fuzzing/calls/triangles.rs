@@ -1,4 +1,4 @@
-//! Pipelines of triangles, lines and points, with any state. `unsafe` as in the module above.
+//! Pipelines of triangles, lines and points, with any state. The safety of `unsafe` is explained in the parent module.
 
 use ash::vk;
 

@@ -1,4 +1,4 @@
-//! Programs as SPIR-V.
+//! Assembles programs as SPIR-V.
 
 use super::super::assembler::{Assembler, Id};
 use super::program::{
@@ -15,7 +15,7 @@ struct Types {
     array: Id,
 }
 
-/// A function being written.
+/// A function under construction.
 struct Writer<'a> {
     asm: &'a mut Assembler,
     types: &'a Types,
@@ -27,19 +27,19 @@ struct Writer<'a> {
     variables: Vec<Id>,
     counters: Vec<Id>,
     array: Id,
-    /// The block being written, where it is known.
+    /// The block under construction, if it is known.
     block: Id,
 }
 
-/// Where jumps go.
+/// The targets of jumps.
 #[derive(Clone, Copy, Default)]
 struct Targets {
     breaks: Id,
     continues: Id,
 }
 
-/// A shader that runs programs one after another: each reads an invocation's two words from binding 0 and leaves its
-/// hash and its result in binding 1, those of all invocations of a program together.
+/// A shader that runs programs one after another. Each reads an invocation's two words from binding 0 and writes its
+/// hash and its result to binding 1. The outputs of all invocations of a program are contiguous.
 pub fn assemble(programs: &[Program]) -> Vec<u32> {
     let mut asm = Assembler::new(INVOCATIONS as u32);
     let types = declare_types(&mut asm);
@@ -107,7 +107,7 @@ fn declare_types(asm: &mut Assembler) -> Types {
     }
 }
 
-/// As the interpreter's `mixed`.
+/// Emits the hash function that the interpreter computes by `mixed`.
 fn mix(asm: &mut Assembler, types: &Types, hash: Id, value: Id) {
     let old = asm.emit(Op::Load, types.u32, &[hash]);
     let both = asm.emit(Op::BitwiseXor, types.u32, &[old, value]);
@@ -183,7 +183,7 @@ impl Writer<'_> {
         self.emit(Op::Load, &[place])
     }
 
-    /// The place of an element at an index, which wraps.
+    /// A pointer to the array element at an index, which wraps.
     fn element(&mut self, index: Id) -> Id {
         let mask = self.asm.u32(ARRAY as u32 - 1);
         let index = self.emit(Op::BitwiseAnd, &[index, mask]);
@@ -200,7 +200,7 @@ impl Writer<'_> {
         self.asm.act(Op::Branch, &[to]);
     }
 
-    /// Writes statements; returns whether their end is reached.
+    /// Emits statements; returns true if their end is reachable.
     fn list(&mut self, statements: &[Statement], targets: Targets) -> bool {
         statements
             .iter()
@@ -295,7 +295,7 @@ impl Writer<'_> {
         self.merge(after, reachable)
     }
 
-    /// Branches on whether a loop goes on.
+    /// Emits the branch that continues or ends a loop.
     fn goes_on(&mut self, it: &Loop, [to, end]: [Id; 2]) {
         let count = self.asm.u32(it.count);
         let counter = self.load(self.counters[it.counter]);
@@ -453,7 +453,7 @@ impl Writer<'_> {
     }
 }
 
-/// Whether a switch is left by a break from within these statements.
+/// True if these statements contain a break that leaves the enclosing switch.
 fn breaks(statements: &[Statement]) -> bool {
     statements.iter().any(|statement| match statement {
         Statement::Break => true,

@@ -1,4 +1,4 @@
-//! Makes programs from seeds.
+//! Generates programs from seeds.
 
 use super::interpret::run;
 use super::program::{
@@ -9,10 +9,10 @@ use rand::seq::IndexedRandom;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// The most steps of an invocation.
+/// The greatest number of steps of an invocation.
 const STEPS: u32 = 3000;
 
-/// The program of a seed, the same one each time. Those that take too many steps for these inputs are passed over.
+/// The program of a seed, the same one each time. Programs that take too many steps for these inputs are skipped.
 pub fn generate(seed: u64, inputs: &[[u32; 2]]) -> Program {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     loop {
@@ -47,23 +47,23 @@ fn program(random: &mut ChaCha8Rng) -> Program {
     Program { functions }
 }
 
-/// What may be left where a statement stands.
+/// The jumps that are allowed at a statement.
 #[derive(Clone, Copy, Default)]
 struct Place {
     breaks: bool,
     continues: bool,
-    /// Within what must not jump at all.
+    /// True inside a construct that must not jump at all.
     calm: bool,
 }
 
 struct Maker<'a> {
     random: &'a mut ChaCha8Rng,
-    /// How many functions can be called.
+    /// The number of functions that can be called.
     callable: usize,
     loops: usize,
-    /// Counters of the loops around.
+    /// The counters of the enclosing loops.
     running: Vec<usize>,
-    /// Statements left to make.
+    /// The number of statements that may still be generated.
     budget: usize,
 }
 

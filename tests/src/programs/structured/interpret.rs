@@ -1,4 +1,4 @@
-//! What programs compute, one invocation at a time.
+//! Interprets programs, one invocation at a time.
 
 use super::program::{
     ARRAY, Binary, Compare, Condition, Expression, Function, Loop, Program, Statement, Switch,
@@ -26,7 +26,7 @@ struct Frame {
     borrowed: u32,
 }
 
-/// The hash and the result that an invocation with these inputs leaves; None if it takes too many steps.
+/// The hash and the result of an invocation with these inputs; `None` if it takes too many steps.
 pub fn run(program: &Program, inputs: [u32; 2], steps: u32) -> Option<[u32; 2]> {
     let mut invocation = Invocation {
         program,
@@ -39,7 +39,7 @@ pub fn run(program: &Program, inputs: [u32; 2], steps: u32) -> Option<[u32; 2]> 
 }
 
 impl Invocation<'_> {
-    /// The result of a call, and what it leaves in the caller's variable.
+    /// The result of a call, and the new value of the variable that the caller passes.
     fn call(&mut self, function: usize, parameters: [u32; 2], lent: u32) -> Option<(u32, u32)> {
         let program = self.program;
         let function: &Function = &program.functions[function];

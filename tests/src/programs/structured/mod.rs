@@ -1,6 +1,6 @@
-//! Structured programs at random: nested loops and switches with fallthrough, breaks, continues and returns wherever
-//! they may be, calls, and arrays indexed at run time. One thing makes them ([`generate`]), another says what they
-//! compute ([`run`]), and a third writes them as SPIR-V ([`assemble`]).
+//! Random structured programs: nested loops and switches with fallthrough, breaks, continues and returns wherever they
+//! are allowed, calls, and arrays indexed at run time. [`generate`] makes them, [`run`] interprets them, and
+//! [`assemble`] writes them as SPIR-V.
 
 mod assemble;
 mod generate;

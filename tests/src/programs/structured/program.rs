@@ -1,10 +1,10 @@
-//! Programs.
+//! The syntax tree of programs.
 
-/// Elements of each function's array.
+/// The number of elements of each function's array.
 pub const ARRAY: usize = 4;
-/// Variables of each function, without loop counters.
+/// The number of variables of each function, without loop counters.
 pub const VARIABLES: usize = 4;
-/// Invocations that run each program.
+/// The number of invocations that run each program.
 pub const INVOCATIONS: usize = 64;
 
 /// A program: the last function is called with an invocation's two inputs.
@@ -14,14 +14,14 @@ pub struct Program {
     pub functions: Vec<Function>,
 }
 
-/// A function of two parameters and a variable of the caller's, which it may write.
+/// A function of two parameters and a pointer to a variable of the caller.
 #[derive(Clone, Debug, Default)]
 pub struct Function {
-    /// What it does.
+    /// The statements of the function.
     pub body: Vec<Statement>,
-    /// What it returns at its end.
+    /// The value that it returns at its end.
     pub result: Expression,
-    /// How many loops it has: each has a counter of its own.
+    /// The number of its loops, each of which has a counter of its own.
     pub loops: usize,
 }
 
@@ -32,14 +32,14 @@ pub enum Expression {
     Constant(u32),
     Parameter(usize),
     Variable(usize),
-    /// The caller's variable.
+    /// The value of the caller's variable.
     Borrowed,
     /// A loop's counter.
     Counter(usize),
     /// The element of the function's array at an index, which wraps.
     Element(Box<Self>),
     Binary(Binary, Box<Self>, Box<Self>),
-    /// Only the chosen one is computed.
+    /// A choice; only the chosen side is computed.
     Choose(Box<Condition>, Box<Self>, Box<Self>),
 }
 
@@ -59,20 +59,20 @@ pub enum Binary {
     And,
     Or,
     Xor,
-    /// By the low five bits.
+    /// Shifts by the low five bits of the right operand.
     ShiftLeft,
-    /// By the low five bits.
+    /// Shifts by the low five bits of the right operand.
     ShiftRight,
-    /// By what is made odd first.
+    /// Divides by the right operand, made odd.
     Divide,
-    /// By what is made odd first.
+    /// The remainder of the division by the right operand, made odd.
     Remainder,
 }
 
 /// A comparison.
 #[derive(Clone, Debug)]
 pub struct Condition {
-    /// Which.
+    /// The comparison operator.
     pub compare: Compare,
     /// Its left side.
     pub left: Expression,
@@ -80,7 +80,7 @@ pub struct Condition {
     pub right: Expression,
 }
 
-/// How two values are compared.
+/// A comparison operator of two values.
 #[derive(Clone, Copy, Debug)]
 #[allow(missing_docs, reason = "the names say it")]
 pub enum Compare {
@@ -88,18 +88,18 @@ pub enum Compare {
     NotEqual,
     Less,
     SignedLess,
-    /// Whether they have a bit in common.
+    /// True if the values have a bit in common.
     Meet,
 }
 
-/// A statement. After a break, a continue or a return nothing follows in a list.
+/// A statement. Nothing follows a break, a continue or a return in a list.
 #[derive(Clone, Debug)]
 #[allow(missing_docs, reason = "the names say it")]
 pub enum Statement {
     Assign(usize, Expression),
     /// Writes the caller's variable.
     Lend(Expression),
-    /// Writes the array at an index, which wraps.
+    /// Writes the array element at an index, which wraps.
     Store(Expression, Expression),
     /// Mixes a value into the invocation's hash, a variable of the module.
     Mix(Expression),
@@ -121,24 +121,24 @@ pub enum Statement {
 /// A loop with a counter from zero.
 #[derive(Clone, Debug)]
 pub struct Loop {
-    /// Its counter.
+    /// The index of its counter.
     pub counter: usize,
-    /// It ends when the counter reaches this, at the latest.
+    /// The loop ends at the latest when the counter reaches this value.
     pub count: u32,
-    /// What else must hold to go on.
+    /// The further condition for continuing.
     pub condition: Condition,
-    /// Whether that is asked at the end of the body instead of before it.
+    /// True if the condition is tested at the end of the body, false if before it.
     pub at_end: bool,
     /// Its body.
     pub body: Vec<Statement>,
-    /// What is done before the next round, after a continue too: nothing that jumps.
+    /// The statements before the next iteration, also after a continue. They contain no jumps.
     pub continuing: Vec<Statement>,
 }
 
 /// A switch.
 #[derive(Clone, Debug)]
 pub struct Switch {
-    /// What is looked for.
+    /// The value that selects a case.
     pub selector: Expression,
     /// Its cases in order.
     pub cases: Vec<Case>,
@@ -147,15 +147,15 @@ pub struct Switch {
 /// A case.
 #[derive(Clone, Debug)]
 pub struct Case {
-    /// Its values; none for the default.
+    /// Its values; empty for the default case.
     pub values: Vec<u32>,
     /// Its body.
     pub body: Vec<Statement>,
-    /// Whether it goes on with the next case, if it comes to its end.
+    /// True if it falls through to the next case at its end.
     pub falls_through: bool,
 }
 
-/// What a value becomes that is mixed into a hash.
+/// The new hash after mixing a value into a hash.
 pub(super) fn mixed(hash: u32, value: u32) -> u32 {
     (hash ^ value).wrapping_mul(0x0100_0193)
 }

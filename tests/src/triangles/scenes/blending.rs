@@ -35,8 +35,8 @@ const OPERATIONS: [Op; 5] = [
     Op::MAX,
 ];
 
-/// Rectangles one over the other. Their colours are unorm bytes exactly, so that a difference of
-/// rounding cannot grow from layer to layer.
+/// Overlapping rectangles. Their colours are exact unorm bytes, so that differences of rounding cannot grow from layer
+/// to layer.
 fn layers() -> Vec<Vertex> {
     let mut vertices = shapes::soup(60, 20);
     for vertex in &mut vertices {
@@ -65,7 +65,7 @@ fn blended(
     simple(gpu, &TargetOptions::of(format), &options, vertices)
 }
 
-/// One layer over the background in floats, for each pair of factors: nothing is rounded.
+/// Draws one layer over the background in floats, for each pair of factors: nothing is rounded.
 pub fn blend_factors(gpu: &Gpu) -> Drawn {
     let vertices = &layers()[..30];
     let pairs = FACTORS
@@ -86,7 +86,7 @@ pub fn blend_operations(gpu: &Gpu) -> Drawn {
     }))
 }
 
-/// Several layers of 8 bits, each rounded.
+/// Draws several layers of 8 bits, each rounded.
 pub fn blended_bytes(gpu: &Gpu) -> Drawn {
     let state = blend(Factor::SRC_ALPHA, Factor::ONE_MINUS_SRC_ALPHA, Op::ADD);
     Ok(blended(
@@ -112,7 +112,7 @@ pub fn blended_srgb(gpu: &Gpu) -> Drawn {
     ))
 }
 
-/// Colour and alpha have their own factors and operations.
+/// Blends colour and alpha with separate factors and operations.
 pub fn separate_alpha(gpu: &Gpu) -> Drawn {
     let state = blend(Factor::SRC_ALPHA, Factor::ONE_MINUS_SRC_ALPHA, Op::ADD)
         .src_alpha_blend_factor(Factor::ONE)
@@ -165,7 +165,7 @@ pub fn logic_operations(gpu: &Gpu) -> Drawn {
     }))
 }
 
-/// Four attachments of three formats, written and blended differently.
+/// Draws to four attachments of three formats, written and blended differently.
 pub fn several_attachments(gpu: &Gpu) -> Drawn {
     need("independentBlend", gpu.features().independent_blend)?;
     let options = PipelineOptions {
@@ -202,7 +202,7 @@ pub fn several_attachments(gpu: &Gpu) -> Drawn {
     Ok(simple(gpu, &target, &options, &layers()))
 }
 
-/// Colour formats that both devices can draw to.
+/// Draws to the colour formats that both devices support.
 pub fn color_formats(gpu: &Gpu) -> Drawn {
     use vk::Format as F;
     let formats = [
@@ -257,7 +257,7 @@ pub fn integer_formats(gpu: &Gpu) -> Drawn {
     }))
 }
 
-/// Values that unorm cannot hold are clamped, and what is not a number becomes zero.
+/// Writes values outside the range of unorm, which are clamped, and NaN, which becomes zero.
 pub fn colors_out_of_range(gpu: &Gpu) -> Drawn {
     let mut vertices = shapes::soup(62, 20);
     for vertex in &mut vertices {

@@ -229,7 +229,7 @@ pub fn dynamic_vertex_strides(gpu: &Gpu) -> Drawn {
     }))
 }
 
-/// Secondary command buffers within a dynamic render.
+/// Executes secondary command buffers in dynamic rendering.
 pub fn secondary_command_buffers(gpu: &Gpu) -> Drawn {
     let target = Target::new(gpu, &TargetOptions::with_depth(D32));
     let options = PipelineOptions {
@@ -265,7 +265,7 @@ pub fn secondary_command_buffers(gpu: &Gpu) -> Drawn {
     }))
 }
 
-/// Part of the target is cleared between draws.
+/// Clears part of the target between draws.
 pub fn clears_within_a_pass(gpu: &Gpu) -> Drawn {
     let target = Target::new(gpu, &TargetOptions::with_depth(D32));
     let options = PipelineOptions {
@@ -316,7 +316,7 @@ pub fn clears_within_a_pass(gpu: &Gpu) -> Drawn {
     }))
 }
 
-/// The contents of earlier passes are kept where they are loaded.
+/// Loads the contents of earlier passes.
 pub fn load_and_store(gpu: &Gpu) -> Drawn {
     let areas = [None, Some([13, 17, 60, 71])];
     let name = |area: &Option<[u32; 4]>| format!("area {area:?}");
@@ -364,7 +364,7 @@ pub fn load_and_store(gpu: &Gpu) -> Drawn {
     }))
 }
 
-/// Pipelines and vertex buffers change between draws.
+/// Changes pipelines and vertex buffers between draws.
 pub fn several_pipelines(gpu: &Gpu) -> Drawn {
     use vk::BlendFactor as Factor;
     let target = Target::new(gpu, &TargetOptions::with_depth(D32));

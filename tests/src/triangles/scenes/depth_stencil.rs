@@ -31,7 +31,7 @@ fn tested(gpu: &Gpu, format: vk::Format, op: Compare, vertices: &[Vertex]) -> Ou
     simple(gpu, &TargetOptions::with_depth(format), &options, vertices)
 }
 
-/// Triangles that were drawn before are drawn again, so that equal depths occur.
+/// Draws some triangles twice, so that equal depths occur.
 pub fn depth_comparisons(gpu: &Gpu) -> Drawn {
     let mut vertices = shapes::whole(0.5, [0.3; 4]);
     vertices.extend(shapes::soup(40, 30));
@@ -122,7 +122,7 @@ pub fn clamped_depth_bias(gpu: &Gpu) -> Drawn {
     Ok(biased(gpu, D32, 0.0, 3.0, 0.02))
 }
 
-/// Depth decides the colour of what a first draw left, only where it is within bounds.
+/// Recolours the result of a first draw where its depths are within the bounds.
 pub fn depth_bounds(gpu: &Gpu) -> Drawn {
     need("depthBounds", gpu.features().depth_bounds)?;
     let target = Target::new(gpu, &TargetOptions::with_depth(D32));
@@ -151,7 +151,7 @@ pub fn depth_bounds(gpu: &Gpu) -> Drawn {
     }))
 }
 
-/// The fragment shader writes depth.
+/// Draws with a fragment shader that writes depth.
 pub fn written_depth(gpu: &Gpu) -> Drawn {
     let options = PipelineOptions {
         fragment: Some(
@@ -170,7 +170,7 @@ pub fn written_depth(gpu: &Gpu) -> Drawn {
     Ok(simple(gpu, &target, &options, &shapes::soup(45, 30)))
 }
 
-/// The fragment shader drops fragments, which must then not write depth either.
+/// Draws with a fragment shader that discards fragments, which must then not write depth either.
 pub fn discarded_fragments(gpu: &Gpu) -> Drawn {
     let options = PipelineOptions {
         fragment: Some(
@@ -221,7 +221,7 @@ fn stencil(op: vk::StencilOpState) -> vk::PipelineDepthStencilStateCreateInfo<'s
         .back(op)
 }
 
-/// What draws with `state` leave of values 0 to 7 in stripes.
+/// The values that remain after draws with `state` over stripes of values 0 to 7.
 fn over_stripes(
     gpu: &Gpu,
     state: &vk::PipelineDepthStencilStateCreateInfo<'static>,
@@ -285,7 +285,7 @@ pub fn stencil_comparisons(gpu: &Gpu) -> Drawn {
     }))
 }
 
-/// Each operation where the stencil test fails, where the depth test fails, and where both pass.
+/// Applies each operation if the stencil test fails, if the depth test fails, and if both pass.
 pub fn stencil_operations(gpu: &Gpu) -> Drawn {
     stencil_format(gpu)?;
     let vertices = shapes::soup(49, 20);
@@ -339,7 +339,7 @@ pub fn stencil_write_mask(gpu: &Gpu) -> Drawn {
     Ok(over_stripes(gpu, &state, &shapes::soup(50, 20)))
 }
 
-/// Front and back faces each have their own state.
+/// Draws front and back faces with separate stencil state.
 pub fn two_sided_stencil(gpu: &Gpu) -> Drawn {
     stencil_format(gpu)?;
     let face = |pass_op| vk::StencilOpState {

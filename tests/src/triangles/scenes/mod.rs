@@ -1,4 +1,4 @@
-//! Scenes that sweep the state of triangle pipelines, each named after what it shows.
+//! Scenes that cover the state of triangle pipelines, each named after its subject.
 
 use gaurast_testkit::Gpu;
 
@@ -17,7 +17,7 @@ mod topology;
 
 pub use super::outcome::{Drawn, Missing};
 
-/// A scene: one function that draws it on any device.
+/// A scene: a function that draws it on any device.
 #[derive(Clone, Copy, Debug)]
 pub struct Scene {
     /// Its name.

@@ -1,4 +1,4 @@
-//! Real models, textured and lit.
+//! Textured and lit models from files.
 
 use ash::vk;
 use glam::Vec3;

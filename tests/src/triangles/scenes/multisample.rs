@@ -30,7 +30,7 @@ pub fn four_samples_with_depth(gpu: &Gpu) -> Drawn {
     Ok(simple(gpu, &target, &options, &shapes::soup(71, 30)))
 }
 
-/// Integers are resolved to their first sample.
+/// Resolves integers, which take their first sample.
 pub fn resolved_integers(gpu: &Gpu) -> Drawn {
     let options = PipelineOptions {
         fragment: Some(
@@ -64,8 +64,8 @@ pub fn resolved_floats(gpu: &Gpu) -> Drawn {
     Ok(simple(gpu, &target, &options, &shapes::flat_soup(73, 30)))
 }
 
-/// Every sample is shaded at its own place. (Without perspective, which lavapipe divides by the `w`
-/// of the pixel's centre; `interpolation` in the tests holds perspective against exact values.)
+/// Shades every sample at its own position. It has no perspective, because lavapipe divides by the `w` of the pixel's
+/// centre; the test `interpolation` compares perspective with exact values.
 pub fn sample_shading(gpu: &Gpu) -> Drawn {
     need("sampleRateShading", gpu.features().sample_rate_shading)?;
     let options = PipelineOptions {
@@ -75,7 +75,7 @@ pub fn sample_shading(gpu: &Gpu) -> Drawn {
     Ok(simple(gpu, &four(), &options, &shapes::flat_soup(74, 30)))
 }
 
-/// The shader asks for its sample, which makes it run for each.
+/// Draws with a shader that reads its sample number and therefore runs for each sample.
 pub fn sample_numbers(gpu: &Gpu) -> Drawn {
     need("sampleRateShading", gpu.features().sample_rate_shading)?;
     let options = PipelineOptions {
@@ -104,8 +104,8 @@ pub fn sample_qualifier(gpu: &Gpu) -> Drawn {
     Ok(simple(gpu, &four(), &options, &shapes::flat_soup(76, 30)))
 }
 
-/// Which sample of those covered stands for the centroid is the device's choice, so that only
-/// pixels wholly inside, and triangles without slope elsewhere, are alike: colours vary little.
+/// Interpolates at centroids. The device chooses the sample that stands for the centroid. Results agree only in pixels
+/// that are wholly inside, or if the values are constant; therefore colours vary little.
 pub fn centroid_qualifier(gpu: &Gpu) -> Drawn {
     let options = PipelineOptions {
         fragment: Some(
@@ -116,7 +116,7 @@ pub fn centroid_qualifier(gpu: &Gpu) -> Drawn {
         ..PipelineOptions::default()
     };
     let mut vertices = shapes::flat_soup(77, 30);
-    // Zero along one edge and never below it, so that only an extrapolation can be negative.
+    // The value is zero along one edge and positive elsewhere, so only extrapolation can make it negative.
     for (index, vertex) in vertices.iter_mut().enumerate() {
         vertex.color = [
             f32::from(index % 3 == 0),
@@ -129,7 +129,7 @@ pub fn centroid_qualifier(gpu: &Gpu) -> Drawn {
 }
 
 pub fn alpha_to_coverage(gpu: &Gpu) -> Drawn {
-    // Alphas away from where one sample more is covered.
+    // Alphas far from the values at which one more sample is covered.
     let mut vertices = shapes::flat_soup(78, 30);
     for (index, vertex) in vertices.iter_mut().enumerate() {
         vertex.color[3] = [0.1, 0.35, 0.6, 0.85, 1.0][index / 3 % 5];
@@ -158,7 +158,7 @@ pub fn sample_mask(gpu: &Gpu) -> Drawn {
     Ok(simple(gpu, &four(), &options, &shapes::flat_soup(80, 30)))
 }
 
-/// The shader reads which samples are covered and chooses which are written.
+/// Draws with a shader that reads the covered samples and chooses the written ones.
 pub fn sample_mask_in_the_shader(gpu: &Gpu) -> Drawn {
     let options = PipelineOptions {
         fragment: Some(
@@ -174,7 +174,7 @@ pub fn sample_mask_in_the_shader(gpu: &Gpu) -> Drawn {
     Ok(simple(gpu, &four(), &options, &shapes::flat_soup(81, 30)))
 }
 
-/// A second pass goes on with the samples of the first.
+/// Loads the samples of a first pass in a second pass.
 pub fn samples_loaded_again(gpu: &Gpu) -> Drawn {
     let target = Target::new(gpu, &four());
     let pipeline = Pipeline::new(gpu, &target, &PipelineOptions::default());
@@ -194,7 +194,7 @@ pub fn samples_loaded_again(gpu: &Gpu) -> Drawn {
     Ok(target.output(gpu))
 }
 
-/// One sample is the same whether or not the image could hold more.
+/// Draws lines and points to an image of four samples.
 pub fn lines_and_points_of_four_samples(gpu: &Gpu) -> Drawn {
     let mut output = gaurast_testkit::Output::default();
     for topology in [

@@ -105,7 +105,7 @@ fn reference(attachment: u32, layout: vk::ImageLayout) -> vk::AttachmentReferenc
 
 const COLOR: vk::ImageLayout = vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL;
 const DEPTH: vk::ImageLayout = vk::ImageLayout::DEPTH_STENCIL_ATTACHMENT_OPTIMAL;
-/// What the descriptors say.
+/// The image layout in the descriptors.
 const READ: vk::ImageLayout = vk::ImageLayout::GENERAL;
 
 fn clears() -> [vk::ClearValue; 3] {
@@ -158,7 +158,7 @@ pub fn render_pass_object(gpu: &Gpu) -> Drawn {
     Ok(target.output(gpu))
 }
 
-/// The second subpass reads the colour and the depth that the first drew.
+/// Reads colour and depth of the first subpass in a second subpass.
 pub fn input_attachments(gpu: &Gpu) -> Drawn {
     let format = vk::Format::D32_SFLOAT;
     let feature = vk::FormatFeatureFlags::SAMPLED_IMAGE;
@@ -252,7 +252,7 @@ pub fn input_attachments(gpu: &Gpu) -> Drawn {
     Ok(target.output(gpu))
 }
 
-/// A subpass resolves its samples at its end.
+/// Resolves samples at the end of a subpass.
 pub fn resolve_attachments(gpu: &Gpu) -> Drawn {
     let target = Target::new(gpu, &TargetOptions::default().multisampled());
     let format = target.options.colors[0];

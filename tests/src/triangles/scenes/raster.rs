@@ -7,7 +7,7 @@ use super::simple::{cases, need, simple, with};
 use crate::triangles::shapes;
 use gaurast_testkit::{FRAGMENT, Gpu, PipelineOptions, TargetOptions, depth_test};
 
-/// Culling of each face, for each winding of front faces.
+/// Culls each face, for each winding of front faces.
 pub fn culling(gpu: &Gpu) -> Drawn {
     let modes = [
         vk::CullModeFlags::NONE,
@@ -79,7 +79,7 @@ pub fn rasterizer_discard(gpu: &Gpu) -> Drawn {
     }))
 }
 
-/// A viewport with negative height flips y, and with it the winding.
+/// Uses a viewport with negative height, which flips y and with it the winding.
 pub fn negative_viewport_height(gpu: &Gpu) -> Drawn {
     let options = PipelineOptions {
         raster: PipelineOptions::default()
@@ -141,7 +141,7 @@ pub fn scissors(gpu: &Gpu) -> Drawn {
     ))
 }
 
-/// A viewport that goes far beyond the target on all sides.
+/// Uses a viewport that extends far beyond the target on all sides.
 pub fn viewport_beyond_the_target(gpu: &Gpu) -> Drawn {
     let options = PipelineOptions::default();
     let vertices = shapes::flat_soup(27, 30);
@@ -157,7 +157,7 @@ pub fn viewport_beyond_the_target(gpu: &Gpu) -> Drawn {
     ))
 }
 
-/// Distances that cut triangles, or remove those that are wholly on the wrong side.
+/// Draws with clip or cull distances, which cut triangles or remove those wholly outside.
 fn distances(gpu: &Gpu, name: &str) -> Drawn {
     let vertex = format!(
         "layout(location = 0) in vec4 position;
@@ -189,10 +189,10 @@ pub fn cull_distances(gpu: &Gpu) -> Drawn {
     distances(gpu, "gl_CullDistance")
 }
 
-/// Rectangles beyond the near and far planes, clipped or clamped.
+/// Draws triangles beyond the near and far planes, clipped or clamped.
 pub fn depth_clamp(gpu: &Gpu) -> Drawn {
     need("depthClamp", gpu.features().depth_clamp)?;
-    // Depths from -0.5 to 1.5 across each triangle, with edges that no plane cuts at a pixel centre.
+    // Depths from -0.5 to 1.5 across each triangle. No edge at a plane runs through a pixel centre.
     let mut vertices = shapes::flat_soup(29, 20);
     for vertex in &mut vertices {
         vertex.position[2] = 2.0 * vertex.position[2] - 0.5;
@@ -209,7 +209,7 @@ pub fn depth_clamp(gpu: &Gpu) -> Drawn {
     }))
 }
 
-/// Multisampled colour of triangles that share edges.
+/// Writes the fragment coordinates as colours.
 pub fn fragment_coordinates(gpu: &Gpu) -> Drawn {
     let options = PipelineOptions {
         fragment: Some(
@@ -223,7 +223,7 @@ pub fn fragment_coordinates(gpu: &Gpu) -> Drawn {
     Ok(simple(gpu, &target, &options, &shapes::soup(30, 30)))
 }
 
-/// A pipeline without varyings or colours but what the fragment shader makes up.
+/// Draws with a pipeline without fragment shader.
 pub fn no_fragment_stage(gpu: &Gpu) -> Drawn {
     let options = PipelineOptions {
         fragment: None,
@@ -251,7 +251,7 @@ pub fn primitive_numbers(gpu: &Gpu) -> Drawn {
     Ok(simple(gpu, &target, &options, &shapes::soup(32, 30)))
 }
 
-/// A target of odd size with triangles that touch its borders.
+/// Draws triangles that touch the borders of a target of odd size.
 pub fn odd_target(gpu: &Gpu) -> Drawn {
     let target = TargetOptions {
         size: [77, 41],

@@ -10,7 +10,7 @@ use gaurast_testkit::{
     TargetOptions, Vertex, attribute, binding,
 };
 
-/// Colours in a vertex format of their own, from a second binding.
+/// Draws with colours in a vertex format of their own, from a second binding.
 fn colored(
     gpu: &Gpu,
     format: vk::Format,
@@ -53,7 +53,7 @@ fn colored(
     })
 }
 
-/// Arbitrary bytes; the exponents of floats are kept from their greatest.
+/// Arbitrary bytes, in which the exponents of floats are not the greatest: no infinity and no NaN.
 fn noise(count: usize) -> Vec<u8> {
     use rand::Rng;
     let mut rng = shapes::rng(101);
@@ -101,7 +101,7 @@ pub fn float_vertex_formats(gpu: &Gpu) -> Drawn {
     }))
 }
 
-/// Interleaved with unused bytes, from an offset, and with a stride of zero.
+/// Reads interleaved vertices with unused bytes, from an offset, and with a stride of zero.
 pub fn vertex_offsets_and_strides(gpu: &Gpu) -> Drawn {
     let strides = [0, 20, 28];
     let name = |stride: &u32| format!("stride {stride}");
@@ -134,7 +134,7 @@ pub fn vertex_offsets_and_strides(gpu: &Gpu) -> Drawn {
     }))
 }
 
-/// Scales positions and mixes colours with what comes from a binding or push constants.
+/// Draws with positions and colours that a binding or push constants modify.
 fn fed(
     gpu: &Gpu,
     declaration: &str,
@@ -182,7 +182,7 @@ fn fed(
     })
 }
 
-/// The members of a block: where it moves, three colours, and a share.
+/// The members of a uniform block: an offset, three colours, and a mixing factor.
 fn block(x: f32) -> Vec<f32> {
     vec![
         x, 0.1, 0.6, 0.9, // move
@@ -227,7 +227,7 @@ pub fn push_constants(gpu: &Gpu) -> Drawn {
     Ok(fed(gpu, &declaration, None, &[&[]], &block(0.15)))
 }
 
-/// Push constants change between draws, in part.
+/// Changes parts of the push constants between draws.
 pub fn push_constants_between_draws(gpu: &Gpu) -> Drawn {
     let options = PipelineOptions {
         vertex: "
@@ -256,7 +256,7 @@ pub fn push_constants_between_draws(gpu: &Gpu) -> Drawn {
     }))
 }
 
-/// Fragments count themselves in a storage buffer, which becomes a picture.
+/// Counts fragments in a storage buffer, whose contents become a picture.
 pub fn fragments_write_storage(gpu: &Gpu) -> Drawn {
     let needed = gpu.features().fragment_stores_and_atomics;
     need("fragmentStoresAndAtomics", needed)?;

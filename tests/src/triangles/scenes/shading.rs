@@ -1,4 +1,4 @@
-//! What shaders do: interpolation, derivatives, control flow, branches.
+//! Shader features: interpolation, derivatives, control flow, specialization.
 
 use ash::vk;
 
@@ -16,7 +16,7 @@ fn fragment(gpu: &Gpu, seed: u64, source: &str) -> Output {
     simple(gpu, &TargetOptions::default(), &options, &vertices)
 }
 
-/// Passes on colour with a qualifier.
+/// Passes on a colour with an interpolation qualifier.
 fn qualified(gpu: &Gpu, seed: u64, qualifier: &str) -> Drawn {
     let vertex = format!(
         "layout(location = 0) in vec4 position;
@@ -50,7 +50,7 @@ pub fn noperspective(gpu: &Gpu) -> Drawn {
     qualified(gpu, 92, "noperspective")
 }
 
-/// Many values of all kinds between the stages.
+/// Passes many values of all types between the stages.
 pub fn many_varyings(gpu: &Gpu) -> Drawn {
     let options = PipelineOptions {
         vertex: "
@@ -93,7 +93,7 @@ pub fn many_varyings(gpu: &Gpu) -> Drawn {
     Ok(simple(gpu, &target, &options, &shapes::soup(93, 30)))
 }
 
-/// Derivatives of values that are linear on the screen, so that coarse and fine ones agree.
+/// Computes derivatives of values that are linear on the screen, so that coarse and fine ones agree.
 pub fn derivatives(gpu: &Gpu) -> Drawn {
     let options = PipelineOptions {
         fragment: Some(
@@ -106,13 +106,13 @@ pub fn derivatives(gpu: &Gpu) -> Drawn {
         ),
         ..PipelineOptions::default()
     };
-    // No perspective, hence linear.
+    // Without perspective the values are linear.
     let vertices = shapes::flat_soup(94, 20);
     let target = TargetOptions::default();
     Ok(simple(gpu, &target, &options, &vertices))
 }
 
-/// Loops whose length varies from pixel to pixel.
+/// Runs loops whose length varies from pixel to pixel.
 pub fn divergent_loops(gpu: &Gpu) -> Drawn {
     Ok(fragment(
         gpu,
@@ -172,7 +172,7 @@ pub fn built_in_functions(gpu: &Gpu) -> Drawn {
     ))
 }
 
-/// Specialization constants of both stages.
+/// Sets specialization constants of both stages.
 pub fn specialization_constants(gpu: &Gpu) -> Drawn {
     let options = PipelineOptions {
         vertex: "
@@ -198,7 +198,7 @@ pub fn specialization_constants(gpu: &Gpu) -> Drawn {
     Ok(simple(gpu, &TargetOptions::default(), &options, &vertices))
 }
 
-/// The vertex shader computes more than it is given.
+/// Computes values in the vertex shader.
 pub fn vertex_arithmetic(gpu: &Gpu) -> Drawn {
     let options = PipelineOptions {
         vertex: "

@@ -1,4 +1,4 @@
-//! What most scenes are: a target, a pipeline and vertices, drawn once.
+//! Helpers for most scenes: a target, a pipeline and vertices, drawn once.
 
 use ash::vk;
 
@@ -7,7 +7,7 @@ use gaurast_testkit::{
     Buffer, Commands, Gpu, Output, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex,
 };
 
-/// Fails with the name of a feature unless it is there.
+/// Fails with the name of a feature if it is missing.
 pub fn need(name: &str, has: vk::Bool32) -> Result<(), Missing> {
     if has == vk::TRUE {
         Ok(())
@@ -16,7 +16,7 @@ pub fn need(name: &str, has: vk::Bool32) -> Result<(), Missing> {
     }
 }
 
-/// Fails unless images of `format` can be used so.
+/// Fails if images of `format` lack a use.
 pub fn need_format(
     gpu: &Gpu,
     format: vk::Format,
@@ -41,7 +41,7 @@ pub fn simple(
     })
 }
 
-/// Binds `vertices` and lets `draws` draw them.
+/// Binds `vertices` and calls `draws`, which draws them.
 pub fn with(
     gpu: &Gpu,
     target: &TargetOptions,
@@ -59,7 +59,7 @@ pub fn with(
     })
 }
 
-/// One output of several cases, each named.
+/// Merges the outputs of several cases into one, under their names.
 pub fn cases<T>(
     cases: impl IntoIterator<Item = T>,
     name: impl Fn(&T) -> String,

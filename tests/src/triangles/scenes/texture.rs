@@ -45,8 +45,8 @@ fn linear() -> vk::SamplerCreateInfo<'static> {
         .max_lod(vk::LOD_CLAMP_NONE)
 }
 
-/// Draws the whole target with a sampler of type `kind` called `image`; `expression` makes a colour
-/// of it and of `uv`, which goes from -0.5 to 1.5 and leans.
+/// Draws the whole target with a sampler of type `kind` called `image`. `expression` computes a colour from it and from
+/// `uv`, which goes from -0.5 to 1.5 and is sheared.
 fn sampled(
     gpu: &Gpu,
     image: &Image,
@@ -104,7 +104,7 @@ pub fn linear_filter(gpu: &Gpu) -> Drawn {
     ))
 }
 
-/// Levels chosen by the shader, so that no derivative is involved.
+/// Samples levels that the shader chooses, so that no derivative is used.
 pub fn explicit_levels(gpu: &Gpu) -> Drawn {
     let modes = [
         vk::SamplerMipmapMode::NEAREST,
@@ -119,7 +119,7 @@ pub fn explicit_levels(gpu: &Gpu) -> Drawn {
     }))
 }
 
-/// Levels chosen by how fast coordinates change, which is the same everywhere.
+/// Samples levels chosen by the derivatives of the coordinates, which are constant.
 pub fn implicit_levels(gpu: &Gpu) -> Drawn {
     let image = image(gpu, vk::ImageViewType::TYPE_2D, [64, 64, 1], 1, 7);
     let scales = [0.3, 0.9, 2.1, 5.3, 11.0];
@@ -131,8 +131,8 @@ pub fn implicit_levels(gpu: &Gpu) -> Drawn {
     }))
 }
 
-/// Waves, whose levels differ little, so that neither does the picture if the level does by what
-/// devices may.
+/// Samples waves whose levels differ little. The level of detail may differ within Vulkan's tolerance, and the picture
+/// then hardly changes.
 pub fn trilinear_filter(gpu: &Gpu) -> Drawn {
     let levels: Vec<Vec<[u8; 4]>> = (0..7)
         .map(|level| {
@@ -140,7 +140,7 @@ pub fn trilinear_filter(gpu: &Gpu) -> Drawn {
             let texel = |index: u16| {
                 let turn = |i: u16| std::f32::consts::TAU * (f32::from(i) + 0.5) / f32::from(side);
                 let (x, y) = (turn(index % side), turn(index / side));
-                // A level's mean of a wave is less high.
+                // The mean of a wave over a texel of a smaller level is less.
                 let height = 100.0 * (1.0 - f32::from(1u16 << level) / 64.0);
                 let waves = [x.sin(), y.cos(), (x + y).sin(), (x - y).cos()];
                 waves.map(|wave| (128.0 + height * wave).round() as u8)
@@ -155,7 +155,7 @@ pub fn trilinear_filter(gpu: &Gpu) -> Drawn {
     Ok(sampled(gpu, &image, &sampler, "sampler2D", expression))
 }
 
-/// Bias of the shader and the sampler, and the sampler's least and greatest level.
+/// Applies the bias of the shader and the sampler, and the sampler's least and greatest level.
 pub fn level_bias_and_limits(gpu: &Gpu) -> Drawn {
     let image = image(gpu, vk::ImageViewType::TYPE_2D, [64, 64, 1], 1, 7);
     let samplers = [
@@ -284,7 +284,7 @@ pub fn three_dimensions(gpu: &Gpu) -> Drawn {
 
 pub fn array_layers(gpu: &Gpu) -> Drawn {
     let image = image(gpu, vk::ImageViewType::TYPE_2D_ARRAY, [16, 16, 1], 5, 1);
-    // Away from where the layer changes.
+    // The layer is not near a rounding threshold.
     let expression = "texture(image, vec3(uv, floor(gl_FragCoord.x / 20.0) - 0.9))";
     Ok(sampled(
         gpu,
@@ -297,7 +297,7 @@ pub fn array_layers(gpu: &Gpu) -> Drawn {
 
 pub fn cube_faces(gpu: &Gpu) -> Drawn {
     let image = image(gpu, vk::ImageViewType::CUBE, [8, 8, 1], 6, 1);
-    // Nearest, since how faces join is an implementation's choice in part.
+    // Nearest filtering, since filtering across the edges of faces is partly an implementation's choice.
     let sampler = vk::SamplerCreateInfo::default();
     let expression =
         "textureLod(image, vec3(3.0 * uv.x - 1.3, 2.0 * uv.y - 0.9, sin(9.0 * uv.x)), 0.0)";
@@ -332,7 +332,7 @@ pub fn anisotropic_filter(gpu: &Gpu) -> Drawn {
     Ok(sampled(gpu, &image, &sampler, "sampler2D", expression))
 }
 
-/// Depth compared with a reference as shadows are.
+/// Compares depth with a reference, as shadow maps do.
 pub fn depth_comparison_samplers(gpu: &Gpu) -> Drawn {
     let options = ImageOptions::new(
         vk::Format::D32_SFLOAT,
@@ -379,7 +379,7 @@ pub fn texture_formats(gpu: &Gpu) -> Drawn {
     Ok(cases(formats, name, |&(format, size)| {
         let mut rng = shapes::rng(112);
         let options = ImageOptions::new(format, [16, 16], vk::ImageUsageFlags::empty());
-        // Small bytes keep floats finite.
+        // Small bytes, so that floats are finite.
         let bytes: Vec<u8> = match format {
             F::R32G32B32A32_SFLOAT => {
                 let floats: Vec<f32> = (0..1024).map(|_| rng.random_range(-0.2..1.2)).collect();
@@ -392,7 +392,7 @@ pub fn texture_formats(gpu: &Gpu) -> Drawn {
     }))
 }
 
-/// Integers are never filtered.
+/// Samples integers, which are never filtered.
 pub fn integer_textures(gpu: &Gpu) -> Drawn {
     let mut rng = shapes::rng(113);
     let texels: Vec<u32> = (0..256).map(|_| rng.random_range(0..256)).collect();
@@ -403,7 +403,7 @@ pub fn integer_textures(gpu: &Gpu) -> Drawn {
     Ok(sampled(gpu, &image, &sampler, "usampler2D", expression))
 }
 
-/// Vertex shaders sample too, at explicit levels.
+/// Samples in vertex shaders, at explicit levels.
 pub fn textures_in_vertex_shaders(gpu: &Gpu) -> Drawn {
     let image = flat(gpu, 2);
     let sampler = Sampler::new(gpu, &linear());

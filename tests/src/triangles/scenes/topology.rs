@@ -36,7 +36,7 @@ pub fn triangle_fan(gpu: &Gpu) -> Drawn {
     Ok(drawn(gpu, Topology::TRIANGLE_FAN, &shapes::zigzag(3, 11)))
 }
 
-/// Which vertex gives flat values differs by topology.
+/// Draws flat values, whose provoking vertex depends on the topology.
 pub fn provoking_vertices(gpu: &Gpu) -> Drawn {
     const FLAT: &str = "
         layout(location = 0) in vec4 position;
@@ -74,7 +74,7 @@ pub fn points(gpu: &Gpu) -> Drawn {
     Ok(drawn(gpu, Topology::POINT_LIST, &shapes::points(5, 300)))
 }
 
-/// Points whose size is in the alpha of their colour.
+/// A vertex shader that sets the point size from the alpha of the colour.
 const SIZED: &str = "
     layout(location = 0) in vec4 position;
     layout(location = 1) in vec4 color;
@@ -128,7 +128,7 @@ pub fn wide_lines(gpu: &Gpu) -> Drawn {
     Ok(simple(gpu, &TargetOptions::default(), &options, &vertices))
 }
 
-/// Lists with adjacency need geometry shaders; without those, every second vertex is not drawn.
+/// Draws with a list of indices of each type: 16 and 32 bits.
 pub fn indices_of_every_type(gpu: &Gpu) -> Drawn {
     let vertices = shapes::soup(11, 30);
     let order: Vec<u16> = (0..90).rev().step_by(2).collect();
@@ -199,7 +199,7 @@ pub fn primitive_restart(gpu: &Gpu) -> Drawn {
     }))
 }
 
-/// Vertices and instances by their numbers.
+/// A vertex shader that uses the numbers of vertices and instances.
 const NUMBERED: &str = "
     layout(location = 0) out vec4 v_color;
     void main() {
@@ -232,7 +232,7 @@ pub fn instances_by_number(gpu: &Gpu) -> Drawn {
     ))
 }
 
-/// Vertices of a rectangle, moved and coloured by instance.
+/// Draws a rectangle that instances move and colour.
 pub fn instances_by_attribute(gpu: &Gpu) -> Drawn {
     let moves: Vec<[f32; 4]> = shapes::points(14, 25)
         .iter()

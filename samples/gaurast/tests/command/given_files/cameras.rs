@@ -1,4 +1,4 @@
-//! Gaussians at known points of the world appear where a camera file's camera has them.
+//! Gaussians at known points are drawn where the camera file's camera projects them.
 
 use std::path::Path;
 
@@ -7,9 +7,9 @@ use serde_json::Value;
 
 use super::render;
 
-/// A camera as its file defines it, worked out here from the file's text alone.
+/// A camera computed by this test directly from the file's text.
 struct Expected {
-    /// Columns right, down and forward.
+    /// The rotation from camera to world: its columns are right, down and forward.
     to_world: DMat3,
     eye: DVec3,
     focal: DVec2,
@@ -18,13 +18,13 @@ struct Expected {
 }
 
 impl Expected {
-    /// The pixel where a point of the world is.
+    /// The pixel of a point in world space.
     fn project(&self, point: DVec3) -> DVec2 {
         let t = self.to_world.transpose() * (point - self.eye);
         self.focal * t.truncate() / t.z + self.principal
     }
 
-    /// Points whose pictures lie apart, at different depths and at no particular place in a pixel.
+    /// Points whose pictures are far apart, at different depths and at arbitrary positions within a pixel.
     fn points(&self) -> Vec<DVec3> {
         let [width, height] = self.size.map(f64::from);
         let spots = (0..12_u32).map(|i| {
@@ -37,7 +37,7 @@ impl Expected {
             let ray = ((pixel - self.principal) / self.focal).extend(1.0);
             self.eye + self.to_world * (depth * ray)
         });
-        // The file holds them in binary32.
+        // The file stores them in binary32.
         spots.map(|point| point.as_vec3().as_dvec3()).collect()
     }
 }
@@ -50,12 +50,12 @@ fn vector(value: &Value) -> DVec3 {
     DVec3::from_array(std::array::from_fn(|i| number(&value[i])))
 }
 
-/// The colour of Gaussian `index`: no two are alike.
+/// A different colour for each Gaussian.
 fn colour(index: usize) -> [f64; 3] {
     [index % 2, index / 2 % 3, index / 6].map(|step| 0.3 + 0.3 * step as f64)
 }
 
-/// A PLY file of small, opaque Gaussians at `points`, each of about a pixel for `camera`.
+/// A PLY file of small, opaque Gaussians at `points`, each about a pixel large for `camera`.
 fn scene(camera: &Expected, points: &[DVec3]) -> String {
     let properties = [
         "x", "y", "z", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3",
@@ -76,7 +76,7 @@ fn scene(camera: &Expected, points: &[DVec3]) -> String {
     text
 }
 
-/// Renders with the camera file and finds every Gaussian where `camera` has it.
+/// Renders with the camera file and checks that every Gaussian is where `camera` projects it.
 fn check(camera: &Expected, file: &Path, arguments: &[&str]) {
     let folder = tempfile::tempdir().expect("a folder");
     let points = camera.points();
@@ -91,7 +91,7 @@ fn check(camera: &Expected, file: &Path, arguments: &[&str]) {
     assert_eq!(<[u32; 2]>::from(picture.dimensions()), camera.size);
     for (index, point) in points.into_iter().enumerate() {
         let expected = camera.project(point);
-        // Its pixels are around it; the next Gaussian's are not.
+        // The pixels of the Gaussian are near it, and those of the next one are not.
         let corner = (expected - 12.0).floor();
         let pixels =
             (0..24_u32).flat_map(|y| (0..24_u32).map(move |x| DVec2::new(x.into(), y.into())));
@@ -112,7 +112,7 @@ fn check(camera: &Expected, file: &Path, arguments: &[&str]) {
     }
 }
 
-/// View `view` of a cameras.json, in a picture of `size`.
+/// The camera of view `view` of a cameras.json, for a picture of `size`.
 fn inria(text: &str, view: usize, size: [u32; 2]) -> Expected {
     let cameras: Value = serde_json::from_str(text).expect("JSON");
     let camera = &cameras[view];
@@ -167,7 +167,7 @@ fn real_camera_paths_are_read() {
 
 #[gaurast_runner::test]
 fn nerfstudio_cameras_are_exactly_those_of_the_file() {
-    // Any rotation; in OpenGL's frame a camera's columns are right, up and back.
+    // An arbitrary rotation. In OpenGL's axes a camera's columns are right, up and back.
     let to_world = glam::DQuat::from_xyzw(0.3, -0.5, 0.7, 0.2).normalize();
     let [right, up, back] = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| to_world * axis);
     let eye = DVec3::new(2.5, -1.25, 7.75);
@@ -196,7 +196,7 @@ fn nerfstudio_cameras_are_exactly_those_of_the_file() {
         size: [640, 480],
     };
     check(&camera, &path, &["--view", "1"]);
-    // Twice as wide: both axes are scaled on their own.
+    // Twice as wide: each axis is scaled separately.
     let wide = Expected {
         focal: DVec2::new(1000.0, 520.0),
         principal: DVec2::new(620.0, 251.0),

@@ -1,4 +1,4 @@
-//! Small good and malformed scene files.
+//! Small valid and malformed scene files.
 
 use std::collections::BTreeSet;
 
@@ -21,13 +21,13 @@ const GOOD: &[&str] = &[
     "minimal-v1.spz",
     "minimal-v3.spz",
     "one-gaussian-binary-le.ply",
-    // Its Gaussian is one that the device skips.
+    // The device skips its Gaussian.
     "overflow-scale.ply",
     "three-gaussian-binary-le.ply",
     "three-points-degree1-v2.spz",
 ];
 
-/// Files that are refused, and why: place and reason as the command says them.
+/// Files that are refused, each with the part of the message that gives place and reason.
 const MALFORMED: &[(&str, &str)] = &[
     (
         "bad-bands.sog",

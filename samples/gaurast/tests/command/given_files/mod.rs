@@ -1,5 +1,5 @@
-//! The `gaurast` command with files that others made: what it refuses and why, and that a camera
-//! file's camera is the one that it draws with.
+//! The `gaurast` command with files of other programs: invalid files are refused with a reason, and pictures use the
+//! camera of a camera file.
 
 mod cameras;
 mod fixtures;

@@ -7,7 +7,7 @@ use gaurast_picture::Size;
 
 use crate::worker::{CONTENDERS, Contender};
 
-/// What whole frames cost.
+/// Arguments of the benchmark of whole frames.
 #[derive(Args)]
 pub struct FramesArguments {
     /// Scene files; the synthetic benchmark scene if there is none
@@ -21,7 +21,7 @@ pub struct FramesArguments {
     #[arg(long, value_name = "WxH", default_value = "1280x720")]
     pub size: Size,
 
-    /// Measured frames of each contender, each from another place; a first, cold one comes before
+    /// Measured frames of each contender, each from another viewpoint, after a first, cold one
     #[arg(long, value_name = "N", default_value_t = 9, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub runs: u32,
 
@@ -42,7 +42,7 @@ pub struct FramesArguments {
     pub json: Option<PathBuf>,
 }
 
-/// What a sweep takes.
+/// Arguments of a sweep.
 #[derive(Args)]
 pub struct SweepArguments {
     /// Fewer frames of fewer pixels, and nothing that is larger than a million Gaussians
@@ -82,7 +82,7 @@ pub struct OptimizationsArguments {
     pub only: Vec<String>,
 }
 
-/// What the sweep over settings takes.
+/// Arguments of the sweep over settings.
 #[derive(Args)]
 pub struct ParetoArguments {
     #[command(flatten)]
@@ -90,7 +90,7 @@ pub struct ParetoArguments {
 
     /// A folder with cameras/*.json and splats/* [default: GAURAST_TEST_DATA of the environment]
     ///
-    /// Cameras that are not there are replaced by an orbit, and scenes that are not there are left out.
+    /// Missing cameras are replaced by an orbit; missing scenes are left out.
     #[arg(long, value_name = "FOLDER")]
     pub data: Option<PathBuf>,
 

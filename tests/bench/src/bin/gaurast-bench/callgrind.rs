@@ -1,4 +1,4 @@
-//! Instructions of a process, counted by Callgrind: a figure that does not depend on what else the machine does.
+//! Counts the instructions of a process by Callgrind. Unlike time, the count does not depend on the machine's load.
 
 use std::io::Write;
 use std::process::{Command, Stdio};
@@ -25,8 +25,8 @@ pub struct Counted {
     pub output: String,
 }
 
-/// Runs this program at [`LEVEL`] on one thread: with `arguments` and more `environment`, and with `input` as its standard
-/// input.
+/// Runs this program at [`LEVEL`] on one thread: with `arguments` and more `environment`, and with `input` as its
+/// standard input.
 ///
 /// # Errors
 /// If Callgrind is not installed, or the process fails.
@@ -58,7 +58,7 @@ pub fn count(
     })
 }
 
-/// The instructions that Callgrind says it collected.
+/// The number of instructions that Callgrind reports.
 fn collected(said: &str) -> Option<u64> {
     let count = |line: &str| line.split_once("Collected : ")?.1.trim().parse().ok();
     said.lines().find_map(count)

@@ -1,4 +1,4 @@
-//! What the driver itself costs, without the device: recording draws and creating pipelines.
+//! The driver's own cost, without the device: recording draws and creating pipelines.
 
 mod work;
 
@@ -24,7 +24,7 @@ pub struct CommandsArguments {
     #[arg(long, value_name = "N", default_value_t = 1000)]
     pipelines: u32,
 
-    /// How often each is measured; the median counts
+    /// Repetitions of each measurement; the median counts
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
     runs: u32,
 
@@ -77,13 +77,13 @@ pub fn run(arguments: &CommandsArguments) -> Result<(), BenchError> {
     Ok(())
 }
 
-/// The instructions of a process that does so many draws and pipelines.
+/// The instructions of a process that records `draws` draws and creates `pipelines` pipelines.
 fn instructions((draws, pipelines): (u32, u32)) -> Result<u64, BenchError> {
     let arguments = [WORKER, &draws.to_string(), &pipelines.to_string()];
     Ok(callgrind::count(&arguments, &[], &[])?.instructions)
 }
 
-/// Does the work that it is told to, for a process that counts.
+/// Does the work of a worker process, whose instructions are counted.
 ///
 /// # Errors
 /// If the driver refuses it.

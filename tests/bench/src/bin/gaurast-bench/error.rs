@@ -1,4 +1,4 @@
-//! Why there are no figures.
+//! Errors of the benchmarks.
 
 use std::path::PathBuf;
 
@@ -10,7 +10,7 @@ use thiserror::Error;
 
 use crate::callgrind::CallgrindError;
 
-/// Why there are no figures. Displayed as one sentence.
+/// A failure of a benchmark. Displayed as one sentence.
 #[derive(Debug, Error)]
 pub enum BenchError {
     #[error(transparent)]

@@ -1,4 +1,4 @@
-//! `gaurast-bench frames`: whole frames of every contender, in turns.
+//! `gaurast-bench frames`: whole frames of every contender, drawn in turns.
 
 use std::io::{Write, stdout};
 
@@ -17,7 +17,7 @@ use crate::median::median;
 use crate::worker::CONTENDERS;
 use crate::workload::{Source, Workload};
 
-/// What was measured.
+/// The results of the benchmark.
 #[derive(Serialize)]
 struct Results {
     machine: Machine,
@@ -42,7 +42,7 @@ struct Series {
     /// The first frame, with everything cold.
     first: Drawn,
     frames: Vec<Drawn>,
-    /// The worst of all judged frames.
+    /// The greatest error of all judged frames.
     error: Option<Error>,
 }
 
@@ -83,7 +83,7 @@ pub(super) fn run(arguments: &FramesArguments) -> Result<(), BenchError> {
         let workload = Workload::new(source, arguments.size.0);
         results.scenes.push(measure(workload, arguments)?);
     }
-    // Whoever reads this may have gone; the files are written all the same.
+    // The reader of standard output may have gone; the files are written all the same.
     let _ = show(&results);
     if let Some(path) = &arguments.csv {
         output::write(path, &csv(&results))?;
@@ -104,7 +104,7 @@ fn measure(workload: Workload, arguments: &FramesArguments) -> Result<SceneResul
     let mut series = Vec::new();
     for &threads in &arguments.threads {
         let mut contestants = start(&workload, threads, &views[0])?;
-        // In turns, so that what else the machine does hits all of them alike.
+        // Contenders take turns, so that other load on the machine affects all of them equally.
         for view in &views[1..] {
             for (worker, series) in &mut contestants {
                 let drawn = worker.draw(view, Settings::default(), None)?;
@@ -121,7 +121,7 @@ fn measure(workload: Workload, arguments: &FramesArguments) -> Result<SceneResul
     })
 }
 
-/// Starts every contender that is there, and draws its first frame.
+/// Starts every contender that is available, and draws its first frame.
 fn start(
     workload: &Workload,
     threads: usize,
@@ -146,7 +146,7 @@ fn start(
     Ok(contestants)
 }
 
-/// Holds `count` frames of each contestant, spread over the path, against the oracle.
+/// Compares `count` frames of each contestant, spread over the path, with the oracle.
 fn judged(
     mut contestants: Vec<(Worker, Series)>,
     judge: &Judge,
@@ -207,7 +207,7 @@ fn summary(scene: &SceneResults) -> Rows {
         "peak MiB",
     ]);
     for series in &scene.series {
-        // Beside this driver's Gaussians on as many threads.
+        // Relative to this driver's Gaussians on the same number of threads.
         let own = scene
             .series
             .iter()
@@ -239,7 +239,7 @@ fn summary(scene: &SceneResults) -> Rows {
     rows
 }
 
-/// Where frames spend their time.
+/// The times of the stages of a frame.
 fn stages(scene: &SceneResults) -> Rows {
     let mut rows = Rows::new(&["contender", "threads", "stage", "ms"]);
     for series in &scene.series {
@@ -260,8 +260,8 @@ fn stages(scene: &SceneResults) -> Rows {
     rows
 }
 
-/// What this driver's rasterization does: evaluations of a Gaussian at a pixel, those that contribute (useful), how many of
-/// these there are in a second of rasterization, and what share of the roofs that is.
+/// The work of this driver's rasterization: evaluations of a Gaussian at a pixel, those that contribute (useful),
+/// evaluations per second, and the share of the roofline that this is.
 fn rasterization(scene: &SceneResults, roofline: Roofline) -> Rows {
     let mut rows = Rows::new(&[
         "threads",

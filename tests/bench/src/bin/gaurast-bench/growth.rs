@@ -1,4 +1,4 @@
-//! `gaurast-bench growth`: how time and memory grow.
+//! `gaurast-bench growth`: the growth of time and memory with the size of the input.
 
 use std::io::{Write, stdout};
 use std::path::Path;
@@ -16,13 +16,13 @@ use crate::median::median;
 use crate::worker::CONTENDERS;
 use crate::workload::{Source, Workload};
 
-/// Gaussians where something else grows.
+/// The number of Gaussians, unless they are the axis.
 const COUNT: usize = 100_000;
 
-/// The pictures' size where something else grows.
+/// The pictures' size, unless it is the axis.
 const SIZE: [u32; 2] = [1280, 720];
 
-/// One thing grows, all others stay.
+/// A measurement in which one quantity grows and all others are constant.
 #[derive(Serialize)]
 struct Axis {
     name: &'static str,
@@ -30,7 +30,7 @@ struct Axis {
     fits: Vec<Fit>,
 }
 
-/// What one amount takes.
+/// The cost of one amount.
 #[derive(Serialize)]
 struct Step {
     amount: f64,
@@ -40,7 +40,7 @@ struct Step {
     memory: Option<u64>,
 }
 
-/// Exponents of the amount that time and memory grow with, by least squares of logarithms.
+/// Exponents of the growth of time and memory with the amount, by least squares of logarithms.
 #[derive(Serialize)]
 struct Fit {
     contender: Contender,
@@ -80,7 +80,7 @@ pub(super) fn run(arguments: &SweepArguments) -> Result<(), BenchError> {
     Ok(())
 }
 
-/// What grows, by name: amounts and what is drawn then.
+/// The axes by name, each with its amounts and the workload of each amount.
 fn axes(quick: bool) -> Vec<(&'static str, Vec<(f64, Workload)>)> {
     let base = |count: usize, size| Workload::new(Source::Benchmark { count }, size);
     let counts: &[usize] = if quick {
@@ -188,7 +188,7 @@ fn measure(
     Ok(Axis { name, steps, fits })
 }
 
-/// The exponent of x that y grows with.
+/// The exponent of x in the growth of y.
 fn exponent(points: &[[f64; 2]]) -> f64 {
     let count = points.len() as f64;
     let logs = || points.iter().map(|point| point.map(f64::ln));

@@ -1,4 +1,4 @@
-//! How far pictures are from what is meant: the binary64 oracle's with 3DGS's settings. Every pixel counts.
+//! The errors of pictures against the binary64 oracle with 3DGS's settings. Every pixel counts.
 
 use std::path::{Path, PathBuf};
 
@@ -17,11 +17,11 @@ use crate::error::BenchError;
 pub struct Error {
     /// The greatest difference of a channel.
     pub max: f64,
-    /// What 99.9 % of the pixels do not exceed.
+    /// The 99.9th percentile of the pixels' differences.
     pub p999: f64,
-    /// Decibels, over red, green and blue.
+    /// The PSNR in decibels, over red, green and blue.
     pub psnr: f64,
-    /// FLIP's mean.
+    /// The mean of FLIP.
     pub flip: f64,
     /// The root of the mean square over red, green and blue.
     pub rmse: f64,
@@ -38,7 +38,7 @@ impl Error {
         }
     }
 
-    /// The worst of each.
+    /// The greatest of each error, and the least PSNR, of both.
     pub fn worst(self, other: Self) -> Self {
         Self {
             max: self.max.max(other.max),
@@ -50,7 +50,7 @@ impl Error {
     }
 }
 
-/// The oracle before a scene.
+/// The oracle, prepared for a scene.
 pub struct Judge {
     scene: SceneBuffers,
 }
@@ -62,7 +62,7 @@ impl Judge {
         }
     }
 
-    /// What is meant.
+    /// The reference picture of the scene, seen by `camera`.
     pub fn reference(&self, camera: &Camera) -> Result<Reference, BenchError> {
         let size = [camera.width, camera.height];
         let oracle = OracleCamera::new(&camera.to_vulkan(), size).ok_or(BenchError::NoOracle)?;
@@ -74,14 +74,14 @@ impl Judge {
     }
 }
 
-/// What is meant, from one view.
+/// The reference picture of one view.
 pub struct Reference {
     pixels: Vec<[f32; 4]>,
     size: [u32; 2],
 }
 
 impl Reference {
-    /// The error of a picture of `size`, which is stretched if it is smaller than what is meant.
+    /// The error of a picture of `size`. If it is smaller than the reference, it is scaled up first.
     pub fn error(&self, pixels: &[[f32; 4]], size: [u32; 2]) -> Error {
         let stretched;
         let pixels = if size == self.size {
@@ -94,7 +94,7 @@ impl Reference {
     }
 }
 
-/// The picture in another size, bilinearly.
+/// Scales the picture to another size, bilinearly.
 fn stretch(pixels: &[[f32; 4]], from: [u32; 2], to: [u32; 2]) -> Vec<[f32; 4]> {
     // The two neighbours along an axis and the weight of the second.
     let neighbours = |axis: usize, place: u32| {
@@ -122,7 +122,7 @@ fn stretch(pixels: &[[f32; 4]], from: [u32; 2], to: [u32; 2]) -> Vec<[f32; 4]> {
     out
 }
 
-/// A file for a worker's picture, gone with the folder that it is in.
+/// A file for a worker's picture. It is deleted with its folder.
 pub struct PictureFile {
     folder: tempfile::TempDir,
 }

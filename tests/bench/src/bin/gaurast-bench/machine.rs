@@ -1,4 +1,4 @@
-//! What the figures were taken on.
+//! A description of the machine on which the figures were measured.
 
 use serde::Serialize;
 
@@ -9,7 +9,7 @@ pub struct Machine {
     pub processor: String,
     /// Processors that the process may use.
     pub processors: usize,
-    /// Those of the processor's features that the device chooses its SIMD level by.
+    /// The processor's features by which the device selects its SIMD level.
     pub simd: Vec<String>,
     /// Bytes of memory, 0 if unknown.
     pub memory: u64,
@@ -17,13 +17,12 @@ pub struct Machine {
     pub system: String,
     /// The program's version and build profile.
     pub program: String,
-    /// Runnable processes of the last minute on average when the run began: more than one is a
-    /// busy machine.
+    /// The average number of runnable processes in the minute before the run. More than one is a busy machine.
     pub load: f64,
 }
 
 impl Machine {
-    /// This one.
+    /// The machine that runs the program.
     pub fn this() -> Self {
         let read = |path: &str| std::fs::read_to_string(path).unwrap_or_default();
         let cpu = read("/proc/cpuinfo");
@@ -69,7 +68,7 @@ impl Machine {
         }
     }
 
-    /// In one line.
+    /// The description in one line.
     pub fn line(&self) -> String {
         format!(
             "{}, {} processors, {:.0} GiB, {}; {}; load {:.1}",

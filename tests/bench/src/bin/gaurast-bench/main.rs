@@ -1,4 +1,4 @@
-//! `gaurast-bench`: run time against error, beside what a machine without a GPU offers otherwise.
+//! `gaurast-bench`: run time and error of Gaussian draws, compared with the alternatives on a machine without a GPU.
 
 mod arguments;
 mod callgrind;
@@ -28,7 +28,7 @@ use commands::{CommandsArguments, CommandsWorkerArguments};
 use counts::{CountsArguments, CountsError, WorkerArguments};
 use error::BenchError;
 
-/// Measures run time and error of this driver's Gaussians, beside quads on lavapipe and on this driver.
+/// Measures run time and error of this driver's Gaussians, and of quads on lavapipe and on this driver.
 ///
 /// Without a command, `gaurast-bench` does what `gaurast-bench frames` does.
 #[derive(Parser)]
@@ -43,25 +43,25 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Draws whole frames and tells their stages.
+    /// Draws whole frames and prints the times of their stages.
     Frames(FramesArguments),
-    /// Sweeps settings and peers over several scenes and draws run time against error.
+    /// Sweeps settings and peers over several scenes and plots run time against error.
     Pareto(ParetoArguments),
-    /// How time and memory grow with Gaussians, pixels, overlap and the share off the screen.
+    /// Measures the growth of time and memory with Gaussians, pixels, overlap and the share outside the picture.
     Growth(SweepArguments),
-    /// What each optimization saves, and what Gaussians cost that nobody sees.
+    /// Measures the time that each optimization saves, and the cost of Gaussians that are not visible.
     Optimizations(OptimizationsArguments),
-    /// Holds instructions, hashes of pictures and sizes of functions against stored ones.
+    /// Compares instructions, hashes of pictures and sizes of functions with stored ones.
     Counts(CountsArguments),
-    /// Tells what recording draws and creating pipelines cost, without the device.
+    /// Measures the cost of recording draws and creating pipelines, without the device.
     Commands(CommandsArguments),
-    /// Draws for the other commands, which start it.
+    /// Draws for the other commands, which start it as a process.
     #[command(hide = true)]
     Worker,
-    /// Draws for `counts`, which starts it.
+    /// Draws for `counts`, which starts it as a process.
     #[command(hide = true)]
     CountsWorker(WorkerArguments),
-    /// Works for `commands`, which starts it.
+    /// Works for `commands`, which starts it as a process.
     #[command(hide = true)]
     CommandsWorker(CommandsWorkerArguments),
 }

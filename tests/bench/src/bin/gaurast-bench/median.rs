@@ -1,6 +1,6 @@
-//! The middle of numbers.
+//! The median.
 
-/// The middle one of `values`, the mean of two if their number is even; NaN of none.
+/// The median of `values`: the mean of the middle two if their number is even; NaN if there is none.
 pub fn median(values: impl IntoIterator<Item = f64>) -> f64 {
     let mut values: Vec<f64> = values.into_iter().collect();
     values.sort_by(f64::total_cmp);

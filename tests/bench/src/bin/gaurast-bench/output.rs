@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use crate::error::BenchError;
 
-/// Rows of text, with a header: what CSV files and tables show.
+/// Rows of text with a header, for CSV files and tables.
 #[derive(Clone, Debug, Default)]
 pub struct Rows {
     pub header: Vec<String>,
@@ -23,7 +23,7 @@ impl Rows {
         }
     }
 
-    /// The rows for a terminal; columns of numbers are set to the right.
+    /// The rows for a terminal; columns of numbers are right-aligned.
     pub fn table(&self) -> Table {
         let mut table = Table::new();
         table.load_style(UTF8_FULL_CONDENSED);
@@ -66,7 +66,7 @@ fn quoted(cell: &str) -> String {
     }
 }
 
-/// A number with as many digits as matter.
+/// A number with as many digits as are significant.
 pub fn number(value: f64) -> String {
     match value.abs() {
         _ if value.is_nan() => "-".to_owned(),

@@ -1,7 +1,9 @@
-//! Two workers that draw the same views in turns. What differs between them is told view by view, by the quickest of several
-//! draws: what else the machine does only ever adds, and views differ by more than what is asked for. It is told twice, by
-//! processes that are started in one order and in the other: of two that do the same, the first has been seen to take up to a
-//! tenth longer for as long as both live.
+//! Two workers that draw the same views in turns.
+//!
+//! The workers are compared view by view, each by the quickest of several draws: other load on the machine only adds
+//! time, and views differ by more than the effect in question. All is measured twice, with the processes started in one
+//! order and in the other. The reason: of two equal processes, the first has been seen to take up to a tenth longer for
+//! as long as both run.
 
 use gaurast_render::Settings;
 use gaurast_scene::camera::Camera;
@@ -11,24 +13,23 @@ use crate::error::BenchError;
 use crate::median::median;
 use crate::workload::Workload;
 
-/// How views are drawn.
+/// The way in which views are drawn.
 #[derive(Clone, Copy, Debug)]
 pub enum Draws {
-    /// So many times each.
+    /// Each view is drawn this many times.
     Again(usize),
-    /// Once each, since the time of a frame depends on the one before.
+    /// Each view is drawn once, since the time of a frame depends on the frame before.
     Once,
 }
 
-/// What both workers drew.
+/// The draws of both workers.
 pub struct Pair {
-    /// By worker, view, round and draw.
+    /// The draws by worker, view, round and repetition.
     draws: [Vec<[Vec<Drawn>; 2]>; 2],
 }
 
 impl Pair {
-    /// Draws `views` by two workers, each with a workload and with what the driver leaves out. The first view is only there to
-    /// warm up.
+    /// Draws `views` with two workers, each with its own workload and driver settings. The first view is a warm-up.
     pub fn draw(
         setups: [(&Workload, &str); 2],
         threads: usize,
@@ -59,7 +60,7 @@ impl Pair {
         Ok(Self { draws })
     }
 
-    /// What the quickest draws of a worker's views took, by `of`: the mean of both rounds.
+    /// The quickest draw of each of a worker's views, measured by `of`: the mean of both rounds.
     fn least(&self, worker: usize, of: impl Fn(&Drawn) -> f64) -> impl Iterator<Item = f64> {
         let least = move |draws: &Vec<Drawn>| draws.iter().map(&of).fold(f64::INFINITY, f64::min);
         let views = self.draws[worker].iter().skip(1);
@@ -71,7 +72,7 @@ impl Pair {
         [0, 1].map(|worker| median(self.least(worker, &of)))
     }
 
-    /// Lower quartile, median and upper quartile over views of what `compare` makes of both workers' quickest draws.
+    /// Lower quartile, median and upper quartile, over views, of `compare` applied to both workers' quickest draws.
     pub fn quartiles(
         &self,
         of: impl Fn(&Drawn) -> f64,
@@ -81,14 +82,14 @@ impl Pair {
         quartiles(pairs.map(|(first, second)| compare(first, second)))
     }
 
-    /// The most that any draw of the first worker took, those to warm up among them.
+    /// The maximum over all draws of the first worker, including the warm-up.
     pub fn most(&self, of: impl Fn(&Drawn) -> f64) -> f64 {
         let draws = self.draws[0].iter().flatten().flatten();
         draws.map(of).fold(0.0, f64::max)
     }
 }
 
-/// A frame's processor time, or its wall time where the system does not tell.
+/// A frame's processor time, or its wall time if the system does not report processor time.
 pub fn time(frame: &Drawn) -> f64 {
     frame.processor.unwrap_or(frame.wall)
 }
@@ -142,7 +143,7 @@ mod tests {
                 ],
             ],
         };
-        // 11, 20 and 32 beside 11, 22 and 33; the first view warms up.
+        // The quickest draws are 11, 20, 32 and 11, 22, 33; the first view is the warm-up.
         assert_eq!(pair.medians(time), [20.0, 22.0]);
         assert_eq!(pair.quartiles(time, |a, b| b - a), [0.0, 1.0, 1.0]);
         assert_eq!(pair.most(time), 95.0);

@@ -18,17 +18,17 @@ use crate::median::median;
 use crate::worker::CONTENDERS;
 use crate::workload::{Source, Workload};
 
-/// A way to draw: who, by which settings, at which part of the resolution.
+/// A way to draw: a contender, its settings, and the part of the resolution that it draws.
 #[derive(Clone, Debug, Serialize)]
 struct Variant {
     contender: Contender,
     name: String,
     settings: Settings,
-    /// Width and height are divided by this; the picture is stretched back before it is judged.
+    /// The divisor of width and height; the picture is scaled up again before it is judged.
     divisor: u32,
 }
 
-/// What a variant takes and misses.
+/// The time and the error of a variant.
 #[derive(Serialize)]
 struct Point {
     variant: Variant,
@@ -37,13 +37,13 @@ struct Point {
     /// The median frame's milliseconds of processor time.
     processor: f64,
     error: Error,
-    /// Whether nothing is both faster and closer.
+    /// True if no other point is both faster and closer to the reference.
     on_front: bool,
 }
 
 impl Point {
-    /// What it costs: processor time, which depends least on what else the machine does; wall time
-    /// where the former is unknown.
+    /// The cost of the point: processor time, which depends least on other load on the machine, or wall time if
+    /// processor time is unknown.
     fn cost(&self) -> f64 {
         if self.processor.is_nan() {
             self.wall
@@ -92,7 +92,7 @@ pub(super) fn run(arguments: &ParetoArguments) -> Result<(), BenchError> {
             table(&scene).table()
         );
         results.scenes.push(scene);
-        // What is known so far is kept if a later scene fails.
+        // The results so far are kept if a later scene fails.
         save(&arguments.output, &results)?;
     }
     Ok(())
@@ -101,7 +101,7 @@ pub(super) fn run(arguments: &ParetoArguments) -> Result<(), BenchError> {
 /// The environment variable of the folder of test data.
 const DATA: &str = "GAURAST_TEST_DATA";
 
-/// The path of a file of test data, or `None` after a line that says so and what is done `instead`.
+/// The path of a file of test data. If it is missing, prints that it is and what is done `instead`, and returns `None`.
 fn present(data: Option<&Path>, name: &str, instead: &str) -> Option<PathBuf> {
     let Some(data) = data else {
         eprintln!("{name}: {instead}, since neither --data nor {DATA} is given");
@@ -115,7 +115,7 @@ fn present(data: Option<&Path>, name: &str, instead: &str) -> Option<PathBuf> {
     Some(path)
 }
 
-/// The scenes, the smallest first, with the files in the folder `data`.
+/// The scenes, the smallest first, with the files of the folder `data`.
 fn workloads(arguments: &SweepArguments, data: Option<&Path>) -> Vec<Workload> {
     let size = if arguments.quick {
         [640, 360]
@@ -156,7 +156,7 @@ fn workloads(arguments: &SweepArguments, data: Option<&Path>) -> Vec<Workload> {
         .collect()
 }
 
-/// Everything that is compared, or what was asked for of it.
+/// All variants, or those that the arguments select.
 fn variants(arguments: &ParetoArguments) -> Result<Vec<Variant>, BenchError> {
     let (only, without) = (&arguments.only, &arguments.without);
     let all = all_variants();
@@ -239,7 +239,7 @@ fn all_variants() -> Vec<Variant> {
         ),
         ("quarter size", exact, 4),
     ];
-    // Nothing ends early with quads.
+    // With quads no pixel is finished early.
     let of_quads = [
         "as meant",
         "alpha 4/255",
@@ -262,7 +262,7 @@ fn all_variants() -> Vec<Variant> {
                     divisor,
                 })
         })
-        // Beside lavapipe, our triangles need no sweep of their own.
+        // Quads on this driver are drawn with the default settings only, since quads on lavapipe show the sweep.
         .filter(|variant| {
             variant.contender != Contender::QuadsOnGaurast || variant.name == "as meant"
         })
@@ -303,7 +303,7 @@ fn measure(
     let smaller = |view: &Camera, divisor: u32| {
         view.resized([view.width, view.height].map(|side| (side / divisor).max(1)))
     };
-    // One view of each warms up; then all take turns.
+    // One view of each is a warm-up; then all take turns.
     for (index, view) in views.iter().take(1).chain(&views).enumerate() {
         for (variant, worker, frames) in &mut draws {
             let camera = smaller(view, variant.divisor);
@@ -348,7 +348,7 @@ fn mark_front(points: &mut [Point]) {
     }
 }
 
-/// Which of the points no other one beats in one coordinate without losing in the other.
+/// For each point, true if no other point is better in one coordinate without being worse in the other.
 fn front(places: &[[f64; 2]]) -> Vec<bool> {
     let beats = |a: [f64; 2], b: [f64; 2]| a[0] <= b[0] && a[1] <= b[1] && a != b;
     places
@@ -434,7 +434,7 @@ fn save(folder: &Path, results: &Results) -> Result<(), BenchError> {
 }
 
 fn panel(scene: &SceneResults) -> Panel {
-    // Equal pictures have no place on a logarithmic axis.
+    // A logarithmic axis has no zero, so equal pictures get a small error.
     let place = |point: &Point| [point.cost(), point.error.rmse.max(1e-9)];
     let series = CONTENDERS.iter().map(|&contender| Series {
         name: contender.name().to_owned(),

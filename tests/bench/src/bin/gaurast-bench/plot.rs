@@ -12,10 +12,10 @@ use crate::error::BenchError;
 /// A panel's size in pixels.
 const PANEL: [u32; 2] = [560, 420];
 
-/// Panels side by side.
+/// The number of panels in a row.
 const COLUMNS: usize = 2;
 
-/// Colours of the series, for eyes of all kinds (Okabe and Ito).
+/// The colours of the series, which people with colour blindness can tell apart (Okabe and Ito).
 const COLORS: [RGBColor; 6] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -25,12 +25,12 @@ const COLORS: [RGBColor; 6] = [
     RGBColor(86, 180, 233),
 ];
 
-/// Points of one colour.
+/// Points of one series.
 pub struct Series {
     pub name: String,
-    /// x, y: both more than 0.
+    /// Coordinates x, y, both more than 0.
     pub points: Vec<[f64; 2]>,
-    /// Whether a line joins them.
+    /// True if a line joins the points.
     pub joined: bool,
 }
 
@@ -39,7 +39,7 @@ pub struct Panel {
     pub title: String,
     pub axes: [&'static str; 2],
     pub series: Vec<Series>,
-    /// A line over everything: the Pareto front, say.
+    /// The points of a line that is drawn over everything, such as the Pareto front.
     pub front: Vec<[f64; 2]>,
 }
 
@@ -48,7 +48,7 @@ pub fn write(stem: &Path, caption: &str, panels: &[Panel]) -> Result<(), BenchEr
     static FONT: Once = Once::new();
     FONT.call_once(|| {
         let font = epaint_default_fonts::UBUNTU_LIGHT;
-        // The font is one, since it is part of the program.
+        // Registering the font cannot fail, since it is part of the program.
         let _ = register_font("sans-serif", FontStyle::Normal, font);
     });
     if let Some(folder) = stem.parent() {
@@ -130,7 +130,7 @@ fn draw_panel<B: DrawingBackend>(
         .y_desc(panel.axes[1])
         .y_label_formatter(&|value| format!("{value:.0e}"))
         .x_label_formatter(&|value| tick(*value))
-        // On logarithmic axes, more crowd one another.
+        // More labels would overlap on a logarithmic axis.
         .x_labels(5)
         .y_labels(6)
         .label_style(("sans-serif", 12))
@@ -166,7 +166,7 @@ fn draw_panel<B: DrawingBackend>(
         .draw()
 }
 
-/// A number beside a tick, as short as it can be: 0.5, 300, 6M.
+/// The label of a tick, as short as possible: 0.5, 300, 6M.
 fn tick(value: f64) -> String {
     match value {
         1e6.. => format!("{}M", value / 1e6),

@@ -1,5 +1,5 @@
-//! Roofs for whole frames: what the tile kernel reaches when everything is in the first-level cache, and the rate at which the
-//! processor multiplies and adds.
+//! Upper bounds of the rasterization's speed: the rate of the tile kernel if all data is in the first-level cache, and
+//! the rate of the processor's multiplications and additions.
 
 use std::hint::black_box;
 use std::time::Instant;
@@ -14,33 +14,34 @@ use super::worker::{Contender, Drawn, Worker};
 use super::workload::{Source, TILE_GAUSSIANS, Workload};
 use crate::error::BenchError;
 
-/// Tiles of a frame. Rates are those of what the larger has more, so that what a frame takes beside does not count.
+/// Numbers of tiles of the two measured frames. Rates come from the difference of the two, so that the fixed cost of a
+/// frame cancels.
 const TILES: [usize; 2] = [4, 20];
 
-/// Frames; the fastest counts.
+/// Number of frames; the fastest counts.
 const FRAMES: usize = 300;
 
-/// Pixels of a block that is evaluated at once.
+/// Pixels of a block, which is evaluated at once.
 const BLOCK: f64 = 16.0;
 
-/// Floating-point operations of an evaluation at a pixel, a fused one counted as two, at the level that takes least: 3 for the
-/// exponent, 8 for its power, 1 for the ceiling, 9 for compositing. Comparisons and whole numbers are not among them.
+/// Floating-point operations of an evaluation at a pixel, with a fused operation counted as two, at the SIMD level that
+/// needs fewest: 3 for the exponent, 8 for its power, 1 for the ceiling, 9 for compositing. Comparisons and integer
+/// operations are not counted.
 const OPERATIONS: f64 = 21.0;
 
 /// Rates on one thread.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Roofline {
-    /// Pairs of a tile and a Gaussian that reaches one block of it, a second.
+    /// Pairs of a tile and a Gaussian that reaches one block of the tile, per second.
     pub pairs: f64,
-    /// Evaluations of a Gaussian at a pixel, a second, of Gaussians that cover the tile.
+    /// Evaluations of a Gaussian at a pixel per second, for Gaussians that cover the tile.
     pub pixels: f64,
-    /// Floating-point operations a second in fused multiplications that wait for nothing, with the widest vectors that there
-    /// are.
+    /// Floating-point operations per second of independent fused multiply-adds with the widest available vectors.
     pub operations: f64,
 }
 
 impl Roofline {
-    /// Measures tiles of one thread.
+    /// Measures the rates on one thread.
     pub fn measure() -> Result<Self, BenchError> {
         let [few, many] = TILES;
         let rate = |whole| -> Result<f64, BenchError> {
@@ -54,26 +55,26 @@ impl Roofline {
         })
     }
 
-    /// The share of the roof that a frame's rasterization reaches on `threads`: the time that its
-    /// pairs and pixels take at the rates above, by the time that it took. It may exceed 1 where
-    /// pairs need less than here.
+    /// The share of the bound that a frame's rasterization reaches on `threads`. It is the time that the frame's pairs
+    /// and pixels take at the rates above, divided by the measured time. It may exceed 1 if pairs cost less than in the
+    /// measurement.
     pub fn share(&self, drawn: &Drawn, threads: usize) -> f64 {
         let pairs = drawn.counter("tile pairs evaluated");
         let pixels = evaluations(drawn);
-        // A pair costs its test and its first block together; what is beyond that is pixels alone.
+        // The rate of pairs includes the first block of each pair, so only the remaining pixels are added.
         let further = (pixels - BLOCK * pairs).max(0.0);
         let per_pixel = ((1.0 / self.pixels) * 256.0 - 1.0 / self.pairs).max(0.0) / (256.0 - BLOCK);
         let roof = pairs / self.pairs + further * per_pixel;
         roof / busy(drawn, threads)
     }
 
-    /// The share of multiplications' rate that a frame's rasterization reaches on `threads`.
+    /// The share of the multiply-add rate that a frame's rasterization reaches on `threads`.
     pub fn share_of_operations(&self, drawn: &Drawn, threads: usize) -> f64 {
         OPERATIONS * evaluations(drawn) / busy(drawn, threads) / self.operations
     }
 }
 
-/// The seconds that threads had for a frame's rasterization.
+/// The seconds of a frame's rasterization, times the number of threads.
 fn busy(drawn: &Drawn, threads: usize) -> f64 {
     drawn.counter("raster") * 1e-3 * threads.max(1) as f64
 }
@@ -83,7 +84,7 @@ pub fn evaluations(drawn: &Drawn) -> f64 {
     BLOCK * drawn.counter("block evaluations")
 }
 
-/// The most floating-point operations a second.
+/// The greatest number of floating-point operations per second.
 fn operations() -> f64 {
     let level = Level::new();
     let rates = (0..FRAMES).map(|_| {
@@ -94,7 +95,7 @@ fn operations() -> f64 {
     rates.fold(0.0, f64::max)
 }
 
-/// Works on more sums than a processor's units have on their way at a time; returns how many operations that was.
+/// Updates more independent sums than a processor has operations in flight; returns the number of operations.
 #[inline(always)]
 fn multiply_and_add<S: Simd>(simd: S) -> f64 {
     const ROUNDS: u32 = 10_000;
@@ -115,7 +116,7 @@ fn multiply_and_add<S: Simd>(simd: S) -> f64 {
     )
 }
 
-/// The least seconds that some tiles took.
+/// The least time, in seconds, of a frame of this many tiles.
 fn fastest(whole: bool, tiles: usize) -> Result<f64, BenchError> {
     let workload = Workload::new(Source::Tiles { whole, tiles }, [16 * tiles as u32, 16]);
     let views = workload.views(&workload.scene()?, 1)?;

@@ -1,5 +1,5 @@
-//! A contender draws in a process of its own, so that its threads, environment and memory are its own, and so that
-//! several can take turns. Parent and child speak lines of JSON.
+//! Worker processes. A contender draws in a process of its own, so that it has its own threads, environment and memory,
+//! and so that several can take turns. Parent and child exchange lines of JSON.
 
 use std::io::{BufRead, BufReader, Write, stdin, stdout};
 use std::path::{Path, PathBuf};
@@ -19,10 +19,10 @@ use crate::error::BenchError;
 /// The hidden command that makes a process a worker.
 pub const COMMAND: &str = "worker";
 
-/// lavapipe's manifest, where distributions put it.
+/// The folders in which distributions install lavapipe's manifest.
 const LAVAPIPE_FOLDERS: [&str; 3] = ["/usr/share", "/etc", "/usr/local/share"];
 
-/// What draws, and on what.
+/// A way to draw Gaussians, and the device that it uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Contender {
     /// The Gaussian topology on this driver.
@@ -51,7 +51,7 @@ pub const CONTENDERS: [Contender; 3] = [
     Contender::QuadsOnGaurast,
 ];
 
-/// What a worker is told first.
+/// The first message to a worker.
 #[derive(Serialize, Deserialize)]
 struct Setup {
     contender: Contender,
@@ -59,19 +59,19 @@ struct Setup {
     threads: usize,
 }
 
-/// What it is told then, again and again.
+/// Each further message to a worker.
 #[derive(Serialize, Deserialize)]
 struct Request {
     camera: Camera,
     settings: Settings,
-    /// Where the picture goes, if it is wanted.
+    /// The file for the picture, if the picture is needed.
     picture: Option<PathBuf>,
-    /// Whether it may be drawn unmeasured before.
+    /// True if the frame may be drawn before it is measured, as a warm-up.
     #[serde(default)]
     is_independent: bool,
 }
 
-/// What it answers.
+/// A worker's reply.
 #[derive(Serialize, Deserialize)]
 enum Reply {
     Ready(Ready),
@@ -79,7 +79,7 @@ enum Reply {
     Failed(String),
 }
 
-/// What a worker is, once it has its scene.
+/// A worker's state after it has loaded its scene.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Ready {
     /// The device's name.
@@ -88,18 +88,18 @@ pub struct Ready {
     pub upload: f64,
 }
 
-/// What a frame took. Times are in milliseconds.
+/// The cost of a frame. Times are in milliseconds.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Drawn {
-    /// From the camera to the picture in host memory.
+    /// The time from setting the camera until the picture is in host memory.
     pub wall: f64,
-    /// Of all threads, if known.
+    /// The processor time of all threads, if known.
     pub processor: Option<f64>,
-    /// The device's counters, or the steps of quads: name, value; times in milliseconds.
+    /// The device's counters, or the steps of quads, each with name and value; times are in milliseconds.
     pub counters: Vec<(String, f64)>,
     /// Names of those counters that are times.
     pub stages: Vec<String>,
-    /// The most memory since the worker was ready, in bytes, if known.
+    /// The peak memory since the worker was ready, in bytes, if known.
     pub memory: Option<u64>,
 }
 
@@ -111,7 +111,7 @@ impl Drawn {
     }
 }
 
-/// The whole input of a worker that draws `views` one after the other and ends.
+/// The whole input of a worker that draws `views` one after the other and exits.
 ///
 /// # Errors
 /// If it cannot be written as JSON.
@@ -135,7 +135,7 @@ pub fn input(workload: &Workload, views: &[Camera]) -> Result<Vec<u8>, BenchErro
     Ok(input)
 }
 
-/// Checks that a worker with this output drew all that it was asked to.
+/// Checks that a worker with this output drew everything that was requested.
 ///
 /// # Errors
 /// If it did not.
@@ -148,26 +148,26 @@ pub fn check(output: &str) -> Result<(), BenchError> {
     Ok(())
 }
 
-/// A worker as its parent sees it.
+/// A worker process as its parent uses it.
 pub struct Worker {
     child: Child,
     requests: Option<ChildStdin>,
     replies: BufReader<ChildStdout>,
-    /// What it said when it was ready.
+    /// The worker's message at the end of its preparation.
     pub ready: Ready,
 }
 
-/// A worker that was not asked for so long is warmed up again.
+/// The idle time after which a worker is warmed up again.
 const PAUSE: Duration = Duration::from_millis(100);
 
 /// The counter of the time in which clusters are made.
 const CLUSTER_TIME: &str = "clusters";
 
-/// What this driver leaves out in benchmarks: all but what only saves where two frames are the same.
+/// The driver's optimizations in benchmarks: all except those that save time only if two frames are equal.
 pub const OPTIMIZATIONS: &str = "all,-temporal-reuse";
 
 impl Worker {
-    /// Starts a worker that shares its work among `threads`; `None` if its device is not there.
+    /// Starts a worker that uses `threads` threads; `None` if its device is not available.
     pub fn start(
         contender: Contender,
         workload: &Workload,
@@ -178,7 +178,7 @@ impl Worker {
         Self::with_optimizations(contender, workload, threads, &optimizations)
     }
 
-    /// As [`Worker::start`]; `optimizations` says what this driver leaves out.
+    /// Starts a worker as [`Worker::start`] does, with the driver's `optimizations`.
     pub fn with_optimizations(
         contender: Contender,
         workload: &Workload,
@@ -190,7 +190,7 @@ impl Worker {
             .arg(COMMAND)
             .env("GAURAST_OPTIMIZATIONS", optimizations)
             .env("GAURAST_THREADS", threads.to_string())
-            // The threads that rasterize; the queue has one more, for vertices.
+            // The number of rasterizer threads; the queue has one more, for vertices.
             .env("LP_NUM_THREADS", threads.to_string())
             .stdin(Stdio::piped())
             .stdout(Stdio::piped());
@@ -241,7 +241,7 @@ impl Worker {
         })
     }
 
-    /// Draws a frame of which the time depends on the one before: it is never drawn twice.
+    /// Draws a frame whose time depends on the frame before; it is never drawn twice.
     pub fn draw_next(&mut self, camera: &Camera) -> Result<Drawn, BenchError> {
         self.request(&Request {
             camera: camera.clone(),
@@ -286,7 +286,7 @@ impl Reply {
 
 impl Drop for Worker {
     fn drop(&mut self) {
-        // Without further requests, it ends.
+        // The worker exits at the end of its input.
         self.requests = None;
         let _ = self.child.wait();
     }
@@ -307,7 +307,7 @@ pub fn lavapipe() -> Option<PathBuf> {
         .find(|path| path.exists())
 }
 
-/// The pixels in a file that a worker left.
+/// Reads the pixels of a file that a worker wrote.
 pub fn read_picture(path: &Path) -> Result<Vec<[f32; 4]>, BenchError> {
     Ok(bytemuck::pod_collect_to_vec(&std::fs::read(path)?))
 }
@@ -319,7 +319,7 @@ fn say(to: &mut impl Write, message: &impl Serialize) -> Result<(), BenchError> 
     Ok(to.flush()?)
 }
 
-/// A worker's life.
+/// The main loop of a worker process.
 pub fn run() -> Result<(), BenchError> {
     let mut lines = stdin().lock().lines();
     let Some(setup) = lines.next() else {
@@ -339,10 +339,9 @@ pub fn run() -> Result<(), BenchError> {
     for (number, line) in lines.enumerate() {
         let request: Request = serde_json::from_str(&line?)?;
         let size = [request.camera.width, request.camera.height];
-        // A picture of another size than the last one has new memory, which one thread touches for the first time; and after a
-        // pause, as when others had their turn, schedulers leave threads together on one processor for as long as a frame
-        // takes. Neither is part of what a frame takes, nor are the clusters that a frame makes, but of the first two: the cold
-        // one, and the first that makes some.
+        // A frame is warmed up in three cases. A picture of another size has new memory, which one thread touches for
+        // the first time. After a pause, schedulers keep threads together on one processor for as long as a frame
+        // takes. The first two frames build clusters. None of these costs belongs to the time of a frame.
         let is_new = size != last_size || last_end.elapsed() > PAUSE || made_clusters;
         let warms_up = request.is_independent && number >= 2 && is_new;
         let reply = match artist.answer(&request, warms_up) {
@@ -391,7 +390,7 @@ impl Artist {
         Ok((artist, Ready { device, upload }))
     }
 
-    /// Draws what is asked for; if it is to `warm_up`, also before, until a frame makes no clusters.
+    /// Draws a requested frame. With `warm_up`, it first draws it unmeasured until a frame builds no clusters.
     fn answer(&mut self, request: &Request, warm_up: bool) -> Result<Drawn, BenchError> {
         let mut is_cold = warm_up;
         while is_cold {

@@ -1,4 +1,4 @@
-//! What is drawn in a benchmark: scenes and the paths of their cameras.
+//! The workloads of benchmarks: scenes and camera paths.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -13,10 +13,10 @@ use crate::error::BenchError;
 /// Seed of everything that is generated.
 const SEED: u64 = 1;
 
-/// Gaussians that reach a tile of [`Source::Tiles`]: with what the kernel needs of them, they stay in a first-level cache.
+/// Gaussians that reach a tile of [`Source::Tiles`]. Their data fits into a first-level cache.
 pub const TILE_GAUSSIANS: usize = 512;
 
-/// Where Gaussians and cameras come from.
+/// The source of Gaussians and cameras.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Source {
     /// `Scene::benchmark` and a path around it.
@@ -29,7 +29,7 @@ pub enum Source {
         /// The number of Gaussians.
         count: usize,
     },
-    /// `Scene::captured` before the cameras of a file, or an orbit.
+    /// `Scene::captured`, seen by the cameras of a file or from an orbit.
     Captured {
         /// The number of Gaussians.
         count: usize,
@@ -41,21 +41,21 @@ pub enum Source {
         /// The scene file.
         path: PathBuf,
     },
-    /// Tiles full of Gaussians that cover all of them, or a block of one each.
+    /// Tiles full of Gaussians, each of which covers the whole tile or one block of it.
     Tiles {
-        /// Whether they cover all of them.
+        /// True if each Gaussian covers the whole tile.
         whole: bool,
         /// The number of tiles, side by side.
         tiles: usize,
     },
-    /// A wall around the benchmark's middle, which nothing shines through.
+    /// An opaque wall around the benchmark scene's centre.
     Wall,
 }
 
-/// Gaussians that are added, and that nobody sees.
+/// Additional Gaussians that are not visible.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Extra {
-    /// A benchmark scene beside the screen.
+    /// A benchmark scene outside the picture.
     Beside {
         /// The number of Gaussians.
         count: usize,
@@ -67,26 +67,26 @@ pub enum Extra {
     },
 }
 
-/// A scene, perhaps changed, and how many pixels its pictures have.
+/// A scene, possibly modified, and the size of its pictures.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Workload {
     /// The scene.
     pub source: Source,
-    /// What its standard deviations are multiplied by.
+    /// The factor of its standard deviations.
     pub scale: f32,
     /// The share of its Gaussians that is moved off the screen.
     pub away: f64,
-    /// Whether the scene's colours are the same from everywhere.
+    /// True if the scene's colours are the same from all directions.
     #[serde(default)]
     pub plain: bool,
-    /// What is added, in shuffled order.
+    /// The Gaussians that are added, in shuffled order.
     pub extra: Option<Extra>,
     /// The pictures' size.
     pub size: [u32; 2],
 }
 
 impl Workload {
-    /// The scene as it is.
+    /// The unmodified scene.
     pub fn new(source: Source, size: [u32; 2]) -> Self {
         Self {
             source,
@@ -133,10 +133,10 @@ impl Workload {
         Ok(scenes::shuffled_with(&scene, &unseen, SEED))
     }
 
-    /// `count` views that differ, in the order of the path.
+    /// `count` different views, in the order of the path.
     pub fn views(&self, scene: &Scene, count: usize) -> Result<Vec<Camera>, BenchError> {
         let size = self.size;
-        // A few degrees from frame to frame, so that nothing of the last frame helps.
+        // A few degrees from frame to frame, so that no result of the last frame can be reused.
         let around = |camera: Camera, pivot: [f64; 3]| {
             (0..count)
                 .map(|frame| camera.turned(pivot, [0.0, 1.0, 0.0], 0.05 * frame as f64))
@@ -157,7 +157,7 @@ impl Workload {
             }
             Source::File { .. } => {
                 let camera = gaurast_scene::frame(scene, DEFAULT_FOV, size);
-                // About a point ahead, as far as the scene's middle is.
+                // The path goes around a point ahead of the camera, at the distance of the scene's centre.
                 let distance = distance_to(scene, &camera);
                 let pivot = std::array::from_fn(|axis| {
                     camera.eye[axis] + distance * camera.rotation[2][axis]
@@ -212,7 +212,7 @@ impl fmt::Display for Source {
     }
 }
 
-/// 300k or 6M.
+/// The count in short form, such as 300k or 6M.
 fn short(count: usize) -> String {
     match count {
         1_000_000.. => format!("{}M", count as f64 / 1e6),
@@ -221,7 +221,7 @@ fn short(count: usize) -> String {
     }
 }
 
-/// How far the middle of the scene's Gaussians is along the line of sight.
+/// The distance of the centre of the scene's Gaussians along the line of sight.
 fn distance_to(scene: &Scene, camera: &Camera) -> f64 {
     let mut depths: Vec<f64> = scene
         .positions()
@@ -239,12 +239,12 @@ fn distance_to(scene: &Scene, camera: &Camera) -> f64 {
     depths.get(depths.len() / 2).copied().unwrap_or(1.0)
 }
 
-/// Tiles in a row, each with as many Gaussians, too faint to saturate it.
+/// Tiles in a row, each with [`TILE_GAUSSIANS`] Gaussians that are too faint to saturate it.
 fn tiles(whole: bool, tiles: usize) -> Scene {
     let copies = if whole { 1 } else { tiles };
     let mut scene = Scene::with_capacity(0, TILE_GAUSSIANS * copies);
     for index in 0..TILE_GAUSSIANS {
-        // In the middle of a block, so that dust reaches no other.
+        // The Gaussian is in the middle of a block and too small to reach another block.
         let block = |i: usize| (4 * (i % 4)) as f32 - 6.0;
         let (scale, opacity) = if whole {
             (40.0 * tiles as f32, 0.009)
@@ -265,7 +265,7 @@ fn tiles(whole: bool, tiles: usize) -> Scene {
     scene
 }
 
-/// A cylinder of opaque Gaussians about the y axis, between the benchmark's camera and what is around the origin.
+/// A cylinder of opaque Gaussians about the y axis, between the benchmark's camera and the origin.
 fn wall() -> Scene {
     const RADIUS: f32 = 4.5;
     const LAYERS: u32 = 4;
@@ -293,7 +293,7 @@ fn wall() -> Scene {
     scene
 }
 
-/// A pixel a unit at a distance of 100.
+/// A camera that shows one unit at a distance of 100 as one pixel.
 fn tiles_camera([width, height]: [u32; 2]) -> Camera {
     Camera {
         model: Model::Pinhole,

@@ -1,5 +1,5 @@
 #version 460
-// What a Gaussian adds to a pixel, premultiplied.
+// The premultiplied colour and alpha of a Gaussian at a pixel.
 
 layout(location = 0) noperspective in vec2 offset;
 layout(location = 1) flat in vec4 color;

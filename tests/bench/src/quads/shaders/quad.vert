@@ -1,17 +1,17 @@
 #version 460
-// A corner of a Gaussian's quad. Gaussians are pulled from a buffer by the vertex's index: a quad an instance costs
-// software rasterizers far more, since they set up each instance on its own.
+// Computes a corner of a Gaussian's quad. The vertex's index selects the Gaussian in a buffer. One instance per quad
+// would cost software rasterizers far more, since they set up each instance separately.
 
 struct Splat {
     vec2 mean;         // in pixels
     vec2 major, minor; // standard deviations along the ellipse's axes, in pixels
-    float radius;      // in standard deviations: where alpha reaches its floor
+    float radius;      // in standard deviations: the distance at which alpha reaches its floor
     float unused;
-    vec4 color;        // and opacity
+    vec4 color;        // with the opacity as alpha
 };
 
 layout(std430, set = 0, binding = 0) readonly buffer Splats { Splat splats[]; };
-layout(push_constant) uniform Push { vec2 pixel; float floor_; }; // a pixel in normalised device coordinates
+layout(push_constant) uniform Push { vec2 pixel; float floor_; }; // pixel size in normalised device coordinates
 
 layout(location = 0) noperspective out vec2 offset;
 layout(location = 1) flat out vec4 color;
@@ -24,8 +24,8 @@ void main() {
     vec2 size = 2.0 / pixel;
     vec2 deviations, place;
     if (splat.radius * length(splat.major) > max(size.x, size.y)) {
-        // Far larger than the picture, which stands in for it: its own corners are so far off that some rasterizers
-        // interpolate badly between them.
+        // The quad is far larger than the picture, so the whole picture is drawn in its place: with corners so far
+        // away, some rasterizers interpolate badly.
         place = (corner * 0.5 + 0.5) * size;
         vec2 from = place - splat.mean;
         deviations = vec2(dot(from, splat.major) / dot(splat.major, splat.major),

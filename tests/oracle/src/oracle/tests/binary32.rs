@@ -1,5 +1,5 @@
-//! The error model against binary32 renderers: a careful one must lie within the envelope, and
-//! careless ones must not, or the comparison would prove nothing.
+//! The error model against binary32 renderers. A careful renderer must be within the envelope. Careless ones must not
+//! be, or else the comparison would prove nothing.
 
 use super::*;
 use crate::compare::{Limits, Verdict, verdict};
@@ -8,7 +8,7 @@ use crate::oracle::render_bounded;
 use crate::oracle::splat::Splat;
 use crate::scenes;
 
-/// What a renderer does carelessly.
+/// The step that a renderer does carelessly.
 #[derive(Clone, Copy, PartialEq)]
 enum Carelessness {
     None,
@@ -37,7 +37,7 @@ enum Conic {
 }
 
 impl Record {
-    /// A careful record is the binary64 one rounded; careless parts are binary32 all the way from
+    /// A careful record is the rounded binary64 one. Careless parts are computed in binary32, starting with
     /// `t`, which the extension evaluates in binary64.
     fn new(
         splat: &Splat,
@@ -211,7 +211,7 @@ fn needles(seed: u64) -> SceneBuffers {
     scene
 }
 
-/// The greatest ratio of alpha's error to what the model grants it, wherever Gaussians contribute.
+/// The greatest ratio of alpha's error to the model's bound, over all pixels to which Gaussians contribute.
 fn greatest_share_of_the_bound(
     scene: &SceneBuffers,
     camera: &OracleCamera,
@@ -251,7 +251,7 @@ fn the_model_bounds_what_binary32_does() {
             let projected = greatest_share_of_the_bound(&scene, &camera, Carelessness::Projection);
             let careful = greatest_share_of_the_bound(&scene, &camera, Carelessness::None);
             assert!(projected < 1.0 && careful < 1.0, "{projected} {careful}");
-            // And the bound is not so wide as to mean nothing.
+            // The bound is not too wide to be useful.
             assert!(projected > 0.1 && careful > 0.05, "{projected} {careful}");
         }
     }

@@ -73,7 +73,7 @@ fn on_awkward_scenes() {
             skips.far += picture.skips.far;
         }
     }
-    // The scenes have what they are for.
+    // The scenes contain the cases that they are made for.
     assert!(skips.non_finite > 0 && skips.zero_quaternion > 0 && skips.negative_scale > 0);
     assert!(skips.opacity_below_floor > 0 && skips.near > 0 && skips.far > 0);
 }

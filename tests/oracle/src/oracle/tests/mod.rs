@@ -52,7 +52,7 @@ fn render(gaussians: &[Gaussian], camera: &OracleCamera, state: &OracleState) ->
     render_literal(&scene.as_oracle(), camera, state)
 }
 
-/// What binary64 says at pixel (x, y).
+/// The binary64 result at pixel (x, y).
 fn at(reference: &Reference, x: u32, y: u32) -> [f64; 4] {
     reference.nominal[(y * reference.width + x) as usize]
 }

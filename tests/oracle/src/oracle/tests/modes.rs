@@ -34,7 +34,7 @@ fn a_disc_is_where_rays_meet_its_plane() {
         // The quaternion is rounded to binary32.
         assert!((at(&picture, px, py)[3] - alpha).abs() < 1e-6, "{px} {py}");
     }
-    // It leans away on one side.
+    // One side of the disc is farther away.
     assert!(at(&picture, 33, 32)[3] > at(&picture, 31, 32)[3]);
 }
 
@@ -75,12 +75,12 @@ fn discs_that_cross_are_in_front_of_each_other() {
     ] {
         let picture = render(&crossing, &camera(), &state);
         let [left, right] = [31, 33].map(|x| at(&picture, x, 32));
-        // The first goes back on the left, where its x is negative: -x sin.
+        // The first goes behind the second on the left, where its x is negative: -x sin.
         assert!(
             left[1] > left[0] && right[0] > right[1],
             "{left:?} {right:?}"
         );
-        // In the middle they are equally deep, and in the order of the draw.
+        // In the middle their depths are equal, so they are in the order of the draw.
         assert_close(at(&picture, 32, 32), [0.5, 0.25, 0.0, 0.75], 1e-6);
     }
     let by_centre = render(&crossing, &camera(), &flat());

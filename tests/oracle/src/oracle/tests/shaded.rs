@@ -1,4 +1,4 @@
-//! What shaders write and read, by hand.
+//! Outputs of vertex shaders and inputs of resolve shaders, against values worked out by hand.
 
 use super::super::resolve::resolve_shaded;
 use super::super::shaded::{OracleOutputs, OracleViewport, project, render_shaded};
@@ -11,7 +11,7 @@ const VIEWPORT: OracleViewport = OracleViewport {
     size: [64.0; 2],
 };
 
-/// In the middle of pixel (40, 24), 4 px^2, at depth z of 1.
+/// A vertex shader's outputs for a disc in the middle of pixel (40, 24), 4 px^2, at depth `z` of 1.
 fn disc(z: f32) -> OracleOutputs {
     OracleOutputs {
         position: [2.0 * 8.5 / 32.0, -2.0 * 7.5 / 32.0, 2.0 * z, 2.0],
@@ -28,7 +28,7 @@ fn one_gaussian_where_the_viewport_puts_it() {
     assert_close(at(&picture, 40, 24), [0.5, 0.25, -0.125, 0.5], 1e-15);
     let alpha = 0.5 * (-0.5_f64 * 10.0 / 4.0).exp();
     assert!((at(&picture, 43, 23)[3] - alpha).abs() < 1e-15);
-    // Upside down the mean is mirrored, and the covariance is not.
+    // With a flipped viewport the mean is mirrored, and the covariance is not.
     let flipped = OracleViewport {
         corner: [0.0, 64.0],
         size: [64.0, -64.0],
@@ -53,7 +53,7 @@ fn compensation_takes_the_determinant_of_what_was_written() {
     };
     let splat = project(&disc(0.5), &VIEWPORT, &state).unwrap();
     assert!((splat.opacity - 0.5 * 4.0 / 4.25).abs() < 1e-15);
-    // Rounding may have left less than no area.
+    // Rounding may have left a slightly negative area.
     let less = OracleOutputs {
         covariance: [4.0, 4.000_001, 4.0],
         ..disc(0.5)

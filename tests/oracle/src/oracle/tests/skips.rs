@@ -1,4 +1,4 @@
-//! What is skipped, and under which reason.
+//! Skipped Gaussians, and the reasons under which they are counted.
 
 use super::*;
 use crate::oracle::{OracleScene, SkipCounts};

@@ -1,11 +1,10 @@
-//! Pixels where binary32 cannot be held to a decision.
+//! Pixels where binary32 cannot be required to take a given branch.
 
 use super::*;
 use crate::oracle::project::project;
 use crate::oracle::{MAX_DECISIONS, error_model};
 
-/// A state whose alpha floor is what `sphere()` gives at pixel (34, 32), all but a relative
-/// `distance`.
+/// A state whose alpha floor equals the alpha of `sphere()` at pixel (34, 32), up to a relative `distance`.
 fn floor_near_alpha(distance: f64) -> (OracleState, f64) {
     let alpha = 0.5 * (-0.5_f64).exp();
     let alpha_floor = (alpha * (1.0 + distance)) as f32;
@@ -82,7 +81,7 @@ fn a_transmittance_next_to_the_floor_goes_both_ways() {
             .outcomes(index(32, 32))
             .map(|rgba| 1.0 - rgba[3])
             .collect();
-        // It finishes before the second layer, or before the third: no way reaches the fourth.
+        // It finishes before the second layer or before the third: no path reaches the fourth.
         assert_eq!(outcomes[0], nominal, "{distance}");
         assert_eq!(outcomes.len(), 2);
         assert_eq!(
@@ -122,7 +121,7 @@ fn a_floor_of_zero_and_the_ceiling_are_decidable() {
     };
     let picture = render(&vec![strong; 20], &camera(), &state);
     assert!(picture.alternatives.is_empty());
-    // Alpha reaches every pixel, as far as binary64 goes.
+    // Alpha reaches every pixel within the range of binary64.
     assert!(picture.nominal.iter().all(|rgba| rgba[3] >= 0.0));
     assert!(at(&picture, 44, 32)[3] > 0.0);
 }
@@ -148,7 +147,7 @@ fn needles_are_granted_more_than_spheres() {
         rotation: [half.cos(), 0.0, 0.0, half.sin()],
         ..sphere()
     };
-    // 57 px along the needle, 0.7 px beside it.
+    // 57 px along the needle, and 0.7 px to its side.
     let needle_error = error(needle, [40.0, 41.0]);
     assert!(
         needle_error > 2.0 * sphere_error && needle_error < 1e-3,

@@ -1,4 +1,4 @@
-//! The unscented transform against the moments of what is really seen of a Gaussian.
+//! The unscented transform against the moments of the exact picture of a Gaussian.
 
 use super::*;
 use crate::oracle::project::project;
@@ -50,7 +50,7 @@ fn gaussian(position: [f32; 3], scale: [f32; 3]) -> Gaussian {
     }
 }
 
-/// What a projection makes of it.
+/// The moments of a Gaussian's projection.
 fn projected(gaussian: &Gaussian, camera: &OracleCamera, unscented: bool) -> Moments {
     let scene = SceneBuffers::new(0, [gaussian.clone()]);
     let state = OracleState {
@@ -106,7 +106,7 @@ fn truth(gaussian: &Gaussian, camera: &OracleCamera) -> Moments {
             f64::from(gaussian.position[i]) + moved
         });
         let (u, v) = match camera.model {
-            // What lies before the near plane has no picture.
+            // Points in front of the near plane have no picture.
             OracleModel::Pinhole if z < f64::from(camera.near) => continue,
             OracleModel::Pinhole => (x / z, y / z),
             OracleModel::Orthographic => (x, y),
@@ -148,7 +148,7 @@ fn it_agrees_with_the_jacobian_on_what_is_small_and_far() {
 
 #[test]
 fn it_is_nearer_to_the_truth_in_wide_fields_and_near_the_eye() {
-    // By what factor it is nearer, at least. Near the poles of a panorama neither is good.
+    // The least factor by which the unscented transform is nearer. Near the poles of a panorama neither is good.
     let cases = [
         // Beyond the edge of the picture, where the Jacobian's slope is clamped.
         (

@@ -1,6 +1,7 @@
-//! Work for the driver alone: draws that are recorded, and pipelines that are created. Nothing is submitted.
+//! Work for the driver alone: draws are recorded and pipelines are created. Nothing is submitted.
 //!
-//! It needs nothing but ash and an entry, so that this file can be compiled with any revision of the driver, or another.
+//! This file uses only ash and an entry, so that it can be compiled with any revision of this driver, or with another
+//! driver.
 
 use std::time::{Duration, Instant};
 
@@ -14,7 +15,7 @@ const FORMAT: vk::Format = vk::Format::R8G8B8A8_UNORM;
 const VERTEX: &[u8] = include_bytes!("../counts/shaders/plain.vert.spv");
 const FRAGMENT: &[u8] = include_bytes!("../counts/shaders/plain.frag.spv");
 
-/// A device and what draws need.
+/// A device and the objects that draws need.
 pub struct Work {
     instance: Instance,
     device: Device,
@@ -35,7 +36,7 @@ impl Work {
     /// Work for the first device of `entry`.
     ///
     /// # Errors
-    /// What a command of Vulkan fails with.
+    /// The error of the Vulkan command that fails.
     pub fn new(entry: Entry) -> Result<Self, vk::Result> {
         let application = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
         let info = vk::InstanceCreateInfo::default().application_info(&application);
@@ -188,7 +189,7 @@ impl Work {
     /// Creates and destroys `count` pipelines, and returns the time that it took.
     ///
     /// # Errors
-    /// What creation fails with.
+    /// The error of pipeline creation.
     pub fn create_pipelines(&self, count: u32) -> Result<Duration, vk::Result> {
         let start = Instant::now();
         for _ in 0..count {
@@ -199,11 +200,11 @@ impl Work {
         Ok(start.elapsed())
     }
 
-    /// Records `count` draws into one pass, each with a scissor and a vertex buffer of its own, and returns the time that
-    /// it took.
+    /// Records `count` draws into one pass, each with a scissor and a vertex buffer of its own, and returns the time
+    /// that it took.
     ///
     /// # Errors
-    /// What recording fails with.
+    /// The error of recording.
     pub fn record_draws(&self, count: u32) -> Result<Duration, vk::Result> {
         let (device, commands) = (&self.device, self.commands);
         let area = vk::Rect2D {
@@ -221,7 +222,7 @@ impl Work {
             .render_area(area)
             .layer_count(1)
             .color_attachments(&target);
-        // SAFETY: commands are in order, and the command buffer is in no use.
+        // SAFETY: commands are in order, and the command buffer is not in use.
         unsafe {
             device.begin_command_buffer(commands, &Default::default())?;
             device.cmd_begin_rendering(commands, &pass);
@@ -245,7 +246,7 @@ impl Work {
 impl Drop for Work {
     fn drop(&mut self) {
         let device = &self.device;
-        // SAFETY: nothing was submitted, and users go before what they use.
+        // SAFETY: nothing was submitted, and each object is destroyed before the objects that it uses.
         unsafe {
             device.destroy_command_pool(self.pool, None);
             device.destroy_pipeline(self.pipeline, None);

@@ -1,4 +1,4 @@
-//! A dispatch: arithmetic, workgroup memory, loads and stores.
+//! A counted dispatch of an n-body simulation: arithmetic, workgroup memory, loads and stores.
 
 use std::sync::Arc;
 
@@ -11,13 +11,13 @@ use rand_chacha::ChaCha8Rng;
 
 use super::objects::Objects;
 
-/// Bodies, each of which pulls at each.
+/// The number of bodies, each of which attracts all others.
 const BODIES: u32 = 1024;
 
-/// Bodies of a workgroup.
+/// The number of bodies of a workgroup.
 const GROUP: u32 = 64;
 
-/// Bodies that pull at each other.
+/// Bodies that attract each other.
 pub(super) struct Bodies {
     commands: CommandBuffers<1>,
     pipeline: vk::Pipeline,
@@ -29,7 +29,7 @@ pub(super) struct Bodies {
 }
 
 impl Bodies {
-    /// Bodies on the first device of `entry`.
+    /// Creates the bodies on the first device of `entry`.
     pub(super) fn new(entry: ash::Entry) -> Result<Self, RenderError> {
         let device = Arc::new(Device::new(entry, Purpose::Triangles(""))?);
         let mut objects = Objects::new(&device);
@@ -106,7 +106,7 @@ impl Bodies {
         self.commands.submit_and_wait(&[0])
     }
 
-    /// The pull on each body, after a run.
+    /// The acceleration of each body, after a run.
     pub(super) fn result(&self) -> Result<Vec<[f32; 4]>, RenderError> {
         let mut pulls = vec![[0.0; 4]; BODIES as usize];
         self.pulls.read(&mut pulls)?;

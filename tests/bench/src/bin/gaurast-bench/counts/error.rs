@@ -1,4 +1,4 @@
-//! Why the counts could not be made, or are not as stored.
+//! Errors of the counts.
 
 use gaurast_bench::quads::QuadError;
 use gaurast_render::RenderError;
@@ -6,7 +6,7 @@ use thiserror::Error;
 
 use crate::callgrind::CallgrindError;
 
-/// Why instructions cannot be counted here.
+/// A reason for which instructions cannot be counted on this machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum Obstacle {
     #[error("valgrind is not there")]
@@ -17,7 +17,7 @@ pub enum Obstacle {
     NoLoader,
 }
 
-/// Why the counts could not be made, or are not as stored. Displayed as one sentence.
+/// A failure of the counts, or a difference from the stored ones. Displayed as one sentence.
 #[derive(Debug, Error)]
 pub enum CountsError {
     #[error(transparent)]

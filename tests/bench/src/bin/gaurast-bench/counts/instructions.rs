@@ -1,4 +1,4 @@
-//! Instructions of a frame, held against stored ones.
+//! Compares the instructions of a frame with stored ones.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -14,10 +14,10 @@ use crate::callgrind::{self, LEVEL};
 use crate::output::Rows;
 use crate::worker::OPTIMIZATIONS;
 
-/// Percent by which a count may differ from the stored one.
+/// The percentage by which a count may differ from the stored one.
 const TOLERANCE: f64 = 1.0;
 
-/// The frame that is counted: the first one is cold, and the second one makes chunks of Gaussians.
+/// The number of the counted frame. The first frame is cold, and the second one builds chunks of Gaussians.
 const FRAMES: u32 = 3;
 
 /// The first obstacle to counting, if there is one.
@@ -39,8 +39,8 @@ pub(super) fn obstacle_to_the_loader() -> Option<Obstacle> {
     obstacle().or_else(|| loader.is_err().then_some(Obstacle::NoLoader))
 }
 
-/// Holds the instructions of every workload's frame against the stored ones, or stores them. Each is counted `runs` times;
-/// the median counts.
+/// Compares the instructions of every workload's frame with the stored ones, or stores them. Each is counted `runs`
+/// times; the median counts.
 pub(super) fn check(report: &mut Report, runs: u32, store: bool) -> Result<(), CountsError> {
     let mut table = Table::load(
         "instructions.csv",
@@ -91,8 +91,8 @@ pub(super) fn check(report: &mut Report, runs: u32, store: bool) -> Result<(), C
     Ok(())
 }
 
-/// Holds the instructions of a Gaussian frame through the Vulkan loader against those of the embedded driver. `manifest` is
-/// the driver's, in JSON.
+/// Compares the instructions of a Gaussian frame through the Vulkan loader with those of the embedded driver.
+/// `manifest` is the path of the driver's JSON manifest.
 pub(super) fn compare_doors(report: &mut Report, manifest: &Path) -> Result<(), CountsError> {
     let workload = Workload::GaussiansSynthetic;
     let embedded = count(workload, None)?;
@@ -107,14 +107,14 @@ pub(super) fn compare_doors(report: &mut Report, manifest: &Path) -> Result<(), 
     Ok(())
 }
 
-/// The instructions of a workload's last frame, embedded or through the loader with the driver of a manifest: those of a
-/// process that draws it less those of one that does not. Everything before is the same in both.
+/// The instructions of a workload's last frame, embedded or through the loader with the driver of `manifest`. It is the
+/// difference of two processes: one draws the frame, and the other stops before it.
 fn count(workload: Workload, manifest: Option<&Path>) -> Result<u64, CountsError> {
     let all = process(workload, FRAMES, manifest)?;
     Ok(all.saturating_sub(process(workload, FRAMES - 1, manifest)?))
 }
 
-/// The instructions of a process that draws so many frames of a workload.
+/// The instructions of a process that draws `frames` frames of a workload.
 fn process(workload: Workload, frames: u32, manifest: Option<&Path>) -> Result<u64, CountsError> {
     let (frames, name) = (frames.to_string(), workload.name());
     let mut arguments = vec![WORKER, "--frames", &frames, &name];

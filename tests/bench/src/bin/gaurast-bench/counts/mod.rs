@@ -1,4 +1,4 @@
-//! `gaurast-bench counts`: figures that do not depend on what else the machine does, held against stored ones.
+//! `gaurast-bench counts`: figures that do not depend on the machine's load, compared with stored ones.
 
 mod compute;
 mod error;
@@ -27,11 +27,11 @@ const REQUIRE: &str = "GAURAST_TEST_REQUIRE";
 /// Arguments of the counts.
 #[derive(Args)]
 pub struct CountsArguments {
-    /// Stores the counts instead of holding them against the stored ones
+    /// Stores the counts instead of comparing them with the stored ones
     #[arg(long)]
     store: bool,
 
-    /// How often instructions are counted; the median counts, and the spread is told
+    /// Repetitions of counting instructions; the median counts, and the spread is printed
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100))]
     runs: u32,
 
@@ -39,7 +39,8 @@ pub struct CountsArguments {
     #[arg(long, value_name = "COUNT", value_enum)]
     only: Vec<Part>,
 
-    /// Compares a frame's instructions through the Vulkan loader, by the driver of this manifest, with the embedded driver's
+    /// Compares a frame's instructions through the Vulkan loader, by the driver of this manifest, with the embedded
+    /// driver's
     #[arg(long, value_name = "ICD.json", conflicts_with_all = ["store", "only"])]
     loader: Option<PathBuf>,
 }
@@ -55,7 +56,7 @@ enum Part {
     Sizes,
 }
 
-/// Makes the counts, and holds them against the stored ones.
+/// Makes the counts, and compares them with the stored ones.
 pub fn run(arguments: &CountsArguments) -> Result<(), CountsError> {
     if cfg!(debug_assertions) {
         return Err(CountsError::Profile);
@@ -83,7 +84,8 @@ pub fn run(arguments: &CountsArguments) -> Result<(), CountsError> {
     }
 }
 
-/// Says whether instructions can be counted where there is this obstacle, and why not.
+/// Returns true if there is no obstacle to counting instructions. Otherwise it prints the obstacle, or fails with it if
+/// the environment requires all programs.
 fn can_count(obstacle: Option<Obstacle>) -> Result<bool, CountsError> {
     let Some(reason) = obstacle else {
         return Ok(true);
@@ -96,7 +98,7 @@ fn can_count(obstacle: Option<Obstacle>) -> Result<bool, CountsError> {
     Ok(false)
 }
 
-/// Draws for the counts.
+/// Draws in a worker process, for the counts.
 pub fn work(arguments: &WorkerArguments) -> Result<(), CountsError> {
     workload::run(arguments)
 }

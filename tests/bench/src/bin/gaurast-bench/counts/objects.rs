@@ -6,7 +6,7 @@ use ash::vk;
 use gaurast_render::device::Device;
 use gaurast_render::{During, RenderError};
 
-/// Objects of one device. They live until no submission uses any of them.
+/// Objects of one device. They exist until no submission uses any of them.
 pub(super) struct Objects {
     images: Vec<(vk::Image, vk::ImageView)>,
     memories: Vec<vk::DeviceMemory>,
@@ -20,7 +20,7 @@ pub(super) struct Objects {
 }
 
 impl Objects {
-    /// No objects yet.
+    /// An empty list of objects.
     pub(super) fn new(device: &Arc<Device>) -> Self {
         Self {
             images: Vec::new(),
@@ -93,7 +93,8 @@ impl Objects {
         Ok(sampler)
     }
 
-    /// A pipeline layout of one descriptor set, and that set, with one descriptor of `kind` at each binding below `count`.
+    /// A pipeline layout of one descriptor set, and that set. It has one descriptor of `kind` at each binding below
+    /// `count`.
     pub(super) fn descriptors(
         &mut self,
         kind: vk::DescriptorType,
@@ -135,13 +136,13 @@ impl Objects {
         let allocate_info = vk::DescriptorSetAllocateInfo::default()
             .descriptor_pool(pool)
             .set_layouts(&set_layouts);
-        // SAFETY: the structure is valid, and the pool has room for the set.
+        // SAFETY: the structure is valid, and the pool is large enough for the set.
         let sets = unsafe { raw.allocate_descriptor_sets(&allocate_info) }
             .during("vkAllocateDescriptorSets")?;
         Ok((layout, sets[0]))
     }
 
-    /// A stage by the SPIR-V `code`, which is valid and has the entry point `main`.
+    /// A shader stage of the SPIR-V `code`, which is valid and has the entry point `main`.
     pub(super) fn stage(
         &mut self,
         stage: vk::ShaderStageFlags,
@@ -202,7 +203,7 @@ impl Objects {
     }
 }
 
-/// All levels of an image's one layer.
+/// All levels of the only layer of an image.
 fn whole(aspects: vk::ImageAspectFlags) -> vk::ImageSubresourceRange {
     vk::ImageSubresourceRange::default()
         .aspect_mask(aspects)
@@ -210,7 +211,7 @@ fn whole(aspects: vk::ImageAspectFlags) -> vk::ImageSubresourceRange {
         .layer_count(1)
 }
 
-/// A barrier that makes an image of undefined contents one of layout `to`, still without accesses.
+/// A barrier that changes an image from the undefined layout to layout `to`, without access masks.
 pub(super) fn begin_image(
     image: vk::Image,
     aspects: vk::ImageAspectFlags,
@@ -227,8 +228,8 @@ pub(super) fn begin_image(
 impl Drop for Objects {
     fn drop(&mut self) {
         let raw = self.device.raw();
-        // SAFETY: every submission has been waited for, and users go before what they use; pools free their sets, and
-        // views may be null.
+        // SAFETY: every submission has been waited for, and each object is destroyed before the objects that it uses.
+        // Pools free their sets, and views may be null.
         unsafe {
             for pipeline in &self.pipelines {
                 raw.destroy_pipeline(*pipeline, None);

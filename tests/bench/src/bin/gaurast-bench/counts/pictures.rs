@@ -14,10 +14,10 @@ use crate::worker::OPTIMIZATIONS;
 /// The SIMD levels of `GAURAST_SIMD`.
 const LEVELS: [&str; 3] = ["sse2", "avx2", "avx512"];
 
-/// Reports whether this processor has a level.
+/// Returns true if this processor has a SIMD level.
 pub(super) fn is_there(level: &str) -> bool {
     #[cfg(target_arch = "x86_64")]
-    // The features that the levels are named after stand for all that each needs.
+    // The feature that a level is named after stands for all features that it needs.
     return match level {
         "avx2" => std::arch::is_x86_feature_detected!("avx2"),
         "avx512" => std::arch::is_x86_feature_detected!("avx512vbmi2"),
@@ -27,8 +27,8 @@ pub(super) fn is_there(level: &str) -> bool {
     return level == "sse2";
 }
 
-/// Holds the hash of every workload's picture at every level against the stored ones, or stores them. One thread and two
-/// must draw the same.
+/// Compares the hash of every workload's picture at every level with the stored ones, or stores them. One thread and
+/// two threads must draw the same.
 pub(super) fn check(report: &mut Report, store: bool) -> Result<(), CountsError> {
     let mut table = Table::load(
         "pictures.csv",

@@ -1,4 +1,4 @@
-//! What a check found.
+//! The results of a check.
 
 /// The failures of a check.
 #[derive(Default)]
@@ -7,7 +7,7 @@ pub(super) struct Report {
 }
 
 impl Report {
-    /// Tells a failure.
+    /// Adds a failure and prints it.
     pub(super) fn fail(&mut self, text: String) {
         println!("FAILED: {text}");
         self.failures += 1;

@@ -1,7 +1,7 @@
-//! Bytes of the device's functions in this program, summed up by module and SIMD level.
+//! Bytes of the device's functions in this program, summed by module and SIMD level.
 //!
-//! The symbol table says where a function is, how long it is and which module it is of, and the debug information says its
-//! type parameters: the level, and the closure that a function of `fearless_simd` was made for.
+//! The symbol table gives a function's address, size and module. The debug information gives its type parameters: the
+//! SIMD level, and the closure for which a function of `fearless_simd` is instantiated.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
@@ -13,16 +13,16 @@ use super::report::Report;
 use super::stored::{Table, percent};
 use crate::output::Rows;
 
-/// Percent by which a sum may differ from the stored one.
+/// The percentage by which a sum may differ from the stored one.
 const TOLERANCE: f64 = 5.0;
 
-/// Bytes of a sum that is stored.
+/// The least number of bytes of a sum that is stored.
 const LEAST: u64 = 4096;
 
-/// The crates whose functions count.
+/// The crates whose functions are counted.
 const CRATES: [&str; 2] = ["simdevice", "isa"];
 
-/// Names of the levels' types, and what the levels are called.
+/// The type names of the levels, and the levels' names.
 const LEVELS: [(&str, &str); 3] = [
     ("::Sse2", "sse2"),
     ("::Avx2", "avx2"),
@@ -36,7 +36,7 @@ struct Sum {
     bytes: u64,
 }
 
-/// Holds the bytes of every module at every level against the stored ones, or stores them.
+/// Compares the bytes of every module at every level with the stored ones, or stores them.
 pub(super) fn check(report: &mut Report, store: bool) -> Result<(), CountsError> {
     let mut table = Table::load(
         "sizes.csv",
@@ -96,14 +96,14 @@ pub(super) fn check(report: &mut Report, store: bool) -> Result<(), CountsError>
     Ok(())
 }
 
-/// The sums of a program in ELF, by module and level.
+/// The sums of an ELF program, by module and level.
 fn sums(program: &[u8]) -> Result<BTreeMap<(String, String), Sum>, CountsError> {
     let file = object::File::parse(program)?;
     let names = debug_names(&file)?;
     let mut sums: BTreeMap<_, Sum> = BTreeMap::new();
     let mut seen = HashSet::new();
     for symbol in file.symbols() {
-        // Functions that are alike have several names at one address.
+        // Identical functions may be merged: several names have one address.
         if symbol.kind() != SymbolKind::Text || symbol.size() == 0 || !seen.insert(symbol.address())
         {
             continue;
@@ -123,7 +123,8 @@ fn sums(program: &[u8]) -> Result<BTreeMap<(String, String), Sum>, CountsError> 
     Ok(sums)
 }
 
-/// The module or type that a function is of, if it is one of [`CRATES`]. `debug_name` is `name<parameters>`.
+/// The module or type to which a function belongs, if it is part of one of [`CRATES`]. `debug_name` is
+/// `name<parameters>`.
 fn module(path: &str, debug_name: &str) -> Option<String> {
     let path = if path.starts_with("<fearless_simd::") {
         debug_name.split_once('<')?.1
@@ -139,14 +140,14 @@ fn module(path: &str, debug_name: &str) -> Option<String> {
     if !CRATES.contains(parts.first()?) {
         return None;
     }
-    // The last part is the function's name, or a type's where the function is one of its own; before an implementation or a
-    // closure, it is a module's or that of the function around it.
+    // The last part is the function's name, or a type's name if the function is associated with it. For a function
+    // in an implementation or a closure, it is the name of the module or of the surrounding function.
     let is_within = path[..end].ends_with("::");
     let length = parts.len() - usize::from(!is_within);
     Some(parts[..length.clamp(1, 4)].join("::"))
 }
 
-/// The level whose type a name holds.
+/// The level whose type occurs in a name.
 fn level(name: &str) -> Option<&'static str> {
     let is_in = |kind: &str| {
         let rest = |at: usize| name[at + kind.len()..].chars().next();
@@ -159,7 +160,7 @@ fn level(name: &str) -> Option<&'static str> {
 
 type Reader<'a> = EndianSlice<'a, LittleEndian>;
 
-/// The names with type parameters of functions, by address.
+/// The names of functions with their type parameters, by address.
 fn debug_names(file: &object::File<'_>) -> Result<HashMap<u64, String>, CountsError> {
     let dwarf = gimli::Dwarf::load(|id| {
         let section = file.section_by_name(id.name());
@@ -187,7 +188,7 @@ fn debug_names(file: &object::File<'_>) -> Result<HashMap<u64, String>, CountsEr
     Ok(names)
 }
 
-/// A function's name, its own or that of the function that it is a copy of.
+/// A function's name: its own, or that of the abstract function that it instantiates.
 fn name(
     dwarf: &gimli::Dwarf<Reader<'_>>,
     unit: &Unit<Reader<'_>>,

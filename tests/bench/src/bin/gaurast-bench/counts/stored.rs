@@ -1,4 +1,4 @@
-//! Tables that are stored beside the sources, one row a line, and held against what is measured.
+//! Tables that are stored next to the sources, one row per line, and compared with measurements.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -14,8 +14,8 @@ pub(super) struct Table {
 }
 
 impl Table {
-    /// The stored table of a file's name, whose rows are named by the first `names` columns. It is empty where there is no
-    /// file.
+    /// Loads the stored table of a file name. The first `names` columns name its rows. The table is empty if there is
+    /// no file.
     pub(super) fn load(
         file: &str,
         comment: &'static str,
@@ -47,7 +47,7 @@ impl Table {
         Ok(table)
     }
 
-    /// The cells of a row but its name.
+    /// The cells of a row without its name.
     pub(super) fn get(&self, name: &[&str]) -> Option<&[String]> {
         let name: Vec<String> = name.iter().map(|part| (*part).to_owned()).collect();
         self.rows.get(&name).map(Vec::as_slice)
@@ -69,7 +69,7 @@ impl Table {
         self.rows.clear();
     }
 
-    /// Writes the table to where it is stored.
+    /// Writes the table to its file.
     pub(super) fn store(&self) -> Result<(), CountsError> {
         let mut text = format!("# {}\n{}\n", self.comment, self.header.join(","));
         for (name, cells) in &self.rows {
@@ -84,7 +84,7 @@ impl Table {
     }
 }
 
-/// How far a figure is from the stored one, in percent of the latter.
+/// The difference of a figure from the stored one, in percent of the stored one.
 pub(super) fn percent(figure: u64, stored: u64) -> f64 {
     100.0 * (figure as f64 / stored as f64 - 1.0)
 }

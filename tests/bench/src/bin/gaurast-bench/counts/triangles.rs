@@ -1,4 +1,4 @@
-//! Draws of triangles: many small ones, and few with a filtered texture.
+//! Counted draws of triangles: many small ones, a textured floor, and overlapping layers.
 
 use std::sync::Arc;
 
@@ -47,20 +47,21 @@ pub(super) struct Triangles {
 }
 
 impl Triangles {
-    /// Triangles of about four pixels, here and there, of any depth.
+    /// Triangles of about four pixels at random places and depths.
     pub(super) fn small(entry: ash::Entry, size: [u32; 2]) -> Result<Self, RenderError> {
         let fragment = include_bytes!("shaders/plain.frag.spv");
         Self::new(entry, size, &small(size), fragment)
     }
 
-    /// A floor with a texture that is enlarged near by and shrunk far away, filtered within and between levels.
+    /// A floor with a texture that is magnified near the camera and minified far away, filtered within and between
+    /// levels.
     pub(super) fn textured(entry: ash::Entry, size: [u32; 2]) -> Result<Self, RenderError> {
         let fragment = include_bytes!("shaders/textured.frag.spv");
         Self::new(entry, size, &floor(), fragment)
     }
 
-    /// Layers that fill the picture, of one colour each: those of its left half come from back to front, those of its right
-    /// half from front to back.
+    /// Layers that fill the picture, each of one colour. Those of the left half are drawn from back to front, those of
+    /// the right half from front to back.
     pub(super) fn layered(entry: ash::Entry, size: [u32; 2]) -> Result<Self, RenderError> {
         let fragment = include_bytes!("shaders/plain.frag.spv");
         Self::new(entry, size, &layers(), fragment)
@@ -376,7 +377,7 @@ fn layers() -> Vec<Vertex> {
     vertices
 }
 
-/// Two triangles that fill the picture, eight times as far away below as above.
+/// Two triangles that fill the picture: the floor, eight times as far away at the bottom as at the top.
 fn floor() -> Vec<Vertex> {
     let corners = [
         [-1.0, -1.0, 1.0],

@@ -1,8 +1,8 @@
 //! The workloads that are counted, and the process that draws them.
 //!
-//! Scenes are generated. Those of triangles and of bodies take additions and multiplications alone; those of Gaussians
-//! take logarithms, exponentials and cosines in binary64 from the system's mathematical library, whose last bits may differ
-//! between machines. They are rounded to binary32 afterwards, so that such a difference seldom remains.
+//! Scenes are generated. Scenes of triangles and of bodies use only additions and multiplications. Scenes of Gaussians
+//! use binary64 logarithms, exponentials and cosines of the system's mathematical library, whose last bits may differ
+//! between machines. The results are rounded to binary32, so such a difference seldom remains.
 
 use ash::Entry;
 use clap::{Args, ValueEnum};
@@ -24,7 +24,7 @@ const GAUSSIANS: usize = 20_000;
 /// Quads, each of which is two triangles of many pixels.
 const QUADS: usize = 3000;
 
-/// The alpha below which a quad ends.
+/// The alpha at which a quad ends.
 const ALPHA_FLOOR: f32 = 1.0 / 255.0;
 
 /// The work that is counted.
@@ -32,7 +32,7 @@ const ALPHA_FLOOR: f32 = 1.0 / 255.0;
 pub(super) enum Workload {
     /// The synthetic scene that performance is measured on
     GaussiansSynthetic,
-    /// A scene as training leaves it
+    /// A scene with the statistics of a captured one
     GaussiansCaptured,
     /// Triangles of about four pixels, with depth
     SmallTriangles,
@@ -72,7 +72,7 @@ impl Workload {
             .map_or_else(String::new, |value| value.get_name().to_owned())
     }
 
-    /// Draws `frames` frames on the first device of `entry`, all alike, and returns the hash of the last one's pixels.
+    /// Draws `frames` equal frames on the first device of `entry`, and returns the hash of the last one's pixels.
     fn draw(self, entry: Entry, frames: u32) -> Result<u64, CountsError> {
         match self {
             Self::GaussiansSynthetic => {
@@ -141,13 +141,13 @@ fn quads(entry: Entry, frames: u32) -> Result<u64, CountsError> {
     Ok(hash(bytemuck::cast_slice(&prepared.picture()?.pixels)))
 }
 
-/// FNV-1a of 64 bits.
+/// The 64-bit FNV-1a hash.
 fn hash(bytes: &[u8]) -> u64 {
     let step = |hash: u64, byte: &u8| (hash ^ u64::from(*byte)).wrapping_mul(0x100_0000_01b3);
     bytes.iter().fold(0xcbf2_9ce4_8422_2325, step)
 }
 
-/// Draws what it is told to, and prints a line for each workload: its name and the hash of its last picture.
+/// Draws as `arguments` say, and prints a line for each workload: its name and the hash of its last picture.
 pub(super) fn run(arguments: &WorkerArguments) -> Result<(), CountsError> {
     for workload in &arguments.workloads {
         let entry = if arguments.through_the_loader {

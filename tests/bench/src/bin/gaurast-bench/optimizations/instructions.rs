@@ -18,13 +18,14 @@ const SIZE: [u32; 2] = [640, 360];
 /// Gaussians of a scene.
 const COUNT: usize = 100_000;
 
-/// The frames from the second one on make clusters, a piece each; they serve this one.
+/// The number of the counted frame. From the second frame on, each frame builds a part of the clusters, which are
+/// complete by this one.
 const WARM: usize = 6;
 
-/// What a scene draws.
+/// The work of a scene.
 #[derive(Clone)]
 enum Work {
-    /// Gaussians, seen from a path.
+    /// Gaussians, seen from the views of a path.
     Gaussians(Box<Workload>, Path),
     /// A workload of the counts.
     Counted(&'static str),
@@ -35,7 +36,7 @@ enum Work {
 struct Scene {
     name: String,
     work: Work,
-    /// The number of the frame, from 1 on.
+    /// The number of the counted frame, from 1 on.
     frame: usize,
 }
 
@@ -56,13 +57,14 @@ impl Scene {
         }
     }
 
-    /// The instructions of the frame: those of a process that draws it less those of one that does not.
+    /// The instructions of the frame. It is the difference of two processes: one draws the frame, and the other stops
+    /// before it.
     fn instructions(&self, optimizations: &str) -> Result<u64, BenchError> {
         let all = self.process(optimizations, self.frame)?;
         Ok(all.saturating_sub(self.process(optimizations, self.frame - 1)?))
     }
 
-    /// The instructions of a process that draws so many frames.
+    /// The instructions of a process that draws `frames` frames.
     fn process(&self, optimizations: &str, frames: usize) -> Result<u64, BenchError> {
         let environment = [("GAURAST_OPTIMIZATIONS", optimizations)];
         let counted = match &self.work {
@@ -140,7 +142,7 @@ fn cases() -> Vec<(&'static str, Scene)> {
     ]
 }
 
-/// Counts, tells and writes them.
+/// Counts the instructions, prints them and writes them to files.
 ///
 /// # Errors
 /// If Callgrind is not installed, or a process fails.

@@ -1,4 +1,5 @@
-//! `gaurast-bench optimizations`: what each optimization saves, and what Gaussians cost that nobody sees.
+//! `gaurast-bench optimizations`: the time that each optimization saves, and the cost of Gaussians that are not
+//! visible.
 
 mod instructions;
 mod path;
@@ -17,7 +18,7 @@ use crate::error::BenchError;
 use crate::workload::{Extra, Source, Workload};
 use path::{Path, TEMPORAL_REUSE, settings};
 
-/// Optimizations of Gaussian draws, and the counter of each, as the device has them.
+/// Optimizations of Gaussian draws, and the device's counter of each.
 const COUNTERS: [(&str, &str); 9] = [
     ("cluster-culling", "outside by clusters"),
     ("occlusion-culling", "hidden by others"),
@@ -43,43 +44,44 @@ struct Results {
     unseen: Vec<Unseen>,
 }
 
-/// What an optimization saves.
+/// The saving of an optimization.
 #[derive(Serialize)]
 struct Saved {
     scene: String,
     optimization: &'static str,
-    /// What its counter says of a frame.
+    /// The value of its counter in a frame.
     counter: f64,
-    /// Milliseconds of a frame with all optimizations, but those from frame to frame, of which this one alone is on.
+    /// Milliseconds of a frame with all optimizations within a frame. Of the optimizations between frames, only this
+    /// one is on.
     with: f64,
-    /// Milliseconds of a frame with this one off, too.
+    /// Milliseconds of a frame in which this one is off, too.
     without: f64,
-    /// Percent of the latter that it saves: the lower quartile of views, the median and the upper quartile.
+    /// The saving in percent of `without`: lower quartile over the views, median and upper quartile.
     share: [f64; 3],
 }
 
-/// What Gaussians cost that nobody sees.
+/// The cost of Gaussians that are not visible.
 #[derive(Serialize)]
 struct Unseen {
     kind: &'static str,
-    /// How many.
+    /// The number of these Gaussians.
     count: usize,
     /// Milliseconds of a frame with them, and without.
     with: f64,
     without: f64,
-    /// Nanoseconds of each in a frame: the lower quartile of views, the median and the upper quartile.
+    /// Nanoseconds of each in a frame: lower quartile over the views, median and upper quartile.
     each: [f64; 3],
-    /// Of these, what preprocessing takes, which varies less than a frame.
+    /// The part of `each` in preprocessing, which varies less than a whole frame.
     to_preprocess: [f64; 3],
-    /// Milliseconds to build chunks, once.
+    /// Milliseconds to build chunks, which happens once.
     chunks: f64,
 }
 
-/// How many times as many Gaussians are unseen as there are in the scene: what one costs is far less than what a frame's time
-/// varies by.
+/// The ratio of Gaussians that are not visible to the others. It is large because the cost of one is far below the
+/// variation of a frame's time.
 const UNSEEN_PER_SEEN: usize = 10;
 
-/// How many times as many views their cost is found from as what an optimization saves.
+/// The factor by which this measurement has more views than the measurement of an optimization.
 const UNSEEN_VIEWS_PER_RUN: usize = 2;
 
 /// Runs the comparison.
@@ -159,7 +161,7 @@ pub(super) fn run(arguments: &OptimizationsArguments) -> Result<(), BenchError> 
     output::write_json(&folder.join("optimizations.json"), &results)
 }
 
-/// What each optimization saves while the camera moves.
+/// The saving of each optimization while the camera moves.
 fn saved(
     scene: &str,
     workload: &Workload,
@@ -173,7 +175,7 @@ fn saved(
         .collect()
 }
 
-/// What an optimization saves, on the path that shows it.
+/// The saving of an optimization, on the path that shows it.
 fn saved_by(
     optimization: &'static str,
     scene: &str,

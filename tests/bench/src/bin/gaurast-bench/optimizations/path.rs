@@ -1,4 +1,4 @@
-//! Paths of cameras, and the optimizations that they show.
+//! Paths of cameras, each suited to an optimization.
 
 use gaurast_scene::camera::Camera;
 
@@ -7,21 +7,21 @@ use crate::pair::Draws;
 use crate::worker::OPTIMIZATIONS;
 use crate::workload::Workload;
 
-/// What only a still camera shows.
+/// The optimization that takes effect only while the camera stands still.
 pub const TEMPORAL_REUSE: &str = "temporal-reuse";
 
-/// How a camera goes from frame to frame.
+/// The movement of a camera from frame to frame.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Path {
-    /// As the workload says, which is far enough for nothing of the last frame to help.
+    /// The workload's path, whose steps are too large for results of the last frame to be reused.
     Own,
     Still,
-    /// The workload's, five times as far away.
+    /// The workload's path, five times as far away.
     Afar,
 }
 
 impl Path {
-    /// The one that shows an optimization.
+    /// The path that shows an optimization.
     pub fn of(optimization: &str) -> Self {
         match optimization {
             TEMPORAL_REUSE => Self::Still,
@@ -29,7 +29,7 @@ impl Path {
         }
     }
 
-    /// The views of so many frames.
+    /// The views of `frames` frames.
     pub fn views(self, workload: &Workload, frames: usize) -> Result<Vec<Camera>, BenchError> {
         let own = workload.views(&workload.scene()?, frames)?;
         let view = |frame: usize| {
@@ -43,7 +43,7 @@ impl Path {
         Ok((0..frames).map(view).collect())
     }
 
-    /// How its views are drawn.
+    /// The way in which its views are drawn.
     pub fn draws(self) -> Draws {
         match self {
             Self::Own | Self::Afar => Draws::Again(DRAWS),
@@ -52,11 +52,11 @@ impl Path {
     }
 }
 
-/// How often a view is drawn, if that changes nothing.
+/// The number of draws of a view, if drawing it again changes nothing.
 pub const DRAWS: usize = 3;
 
-/// What the driver leaves out with an optimization and without it. What saves from frame to frame is on alone, where that is asked
-/// for: it would hide what others save.
+/// The driver's settings with an optimization and without it. An optimization between frames is on only where it is the
+/// one in question, because it would hide the savings of others.
 pub fn settings(optimization: &str) -> [String; 2] {
     match Path::of(optimization) {
         Path::Own | Path::Afar => [

@@ -1,5 +1,5 @@
 #version 450
-// The pull of all bodies on each, by tiles of them in workgroup memory.
+// Computes the attraction of each body by all others, tile by tile in workgroup memory.
 layout(local_size_x = 64) in;
 layout(set = 0, binding = 0) readonly buffer Bodies { vec4 bodies[]; };
 layout(set = 0, binding = 1) writeonly buffer Pulls { vec4 pulls[]; };

@@ -1,5 +1,5 @@
 #version 450
-// Triangles as they lie in the buffer, with a colour at each corner.
+// Passes on positions and colours from the buffer.
 layout(location = 0) in vec4 position;
 layout(location = 1) in vec4 color;
 layout(location = 0) out vec4 v_color;
