@@ -72,7 +72,7 @@ fn gaussian(rng: &mut ChaCha8Rng) -> [f32; FLOATS] {
     out
 }
 
-/// What is done about depth.
+/// The depth modes: what becomes of depth.
 struct Depth {
     test: Option<DepthTest>,
     stored: f32,

@@ -1,4 +1,4 @@
-//! How fast the front end of triangle draws is: vertices and triangles a second before tiles.
+//! Throughput of the front end of triangle draws: vertices and triangles a second, before tiles.
 //!
 //! `cargo run --release -p simdevice --example geometry_throughput`
 

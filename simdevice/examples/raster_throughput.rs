@@ -1,4 +1,4 @@
-//! How fast triangle mode is: fill, tiny triangles, arithmetic, overdraw and multisampling at 1920x1080.
+//! Throughput of triangle mode: fill, tiny triangles, arithmetic, overdraw and multisampling at 1920x1080.
 //!
 //! `cargo run --release -p simdevice --example raster_throughput [workers [words of a scene's name]]`
 
@@ -90,7 +90,7 @@ fn programs(rounds: u32) -> DrawPrograms {
     }
 }
 
-/// What is drawn.
+/// The scenes that are drawn.
 struct Scene {
     name: &'static str,
     vertices: Vec<[f32; FLOATS]>,

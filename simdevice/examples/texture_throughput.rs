@@ -1,4 +1,4 @@
-//! How fast the texture unit samples, at every SIMD level of this processor: quads of a slightly turned surface
+//! Throughput of the texture unit at every SIMD level of this processor: quads of a slightly turned surface
 //! all over a 1024x1024 image. Processor time, so that other programs don't count.
 //!
 //! `cargo run --release -p simdevice --example texture_throughput`

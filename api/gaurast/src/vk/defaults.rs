@@ -46,7 +46,7 @@ impl Default for GaussianResolveInputLocationsGAURAST {
     }
 }
 
-/// What the original 3DGS code draws, of degree 0 and with every location unused.
+/// The state of the original 3DGS code, with harmonics of degree 0 and every location unused.
 impl Default for PipelineGaussianStateCreateInfoGAURAST<'_> {
     #[inline]
     fn default() -> Self {
