@@ -441,6 +441,7 @@ mod tests {
             count::<vk::PhysicalDeviceBorderColorSwizzleFeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceCustomBorderColorFeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceDepthClipEnableFeaturesEXT<'_>>(),
+            count::<vk::PhysicalDeviceDepthClipControlFeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceRobustness2FeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceWorkgroupMemoryExplicitLayoutFeaturesKHR<'_>>(),
             count::<vk::PhysicalDeviceColorWriteEnableFeaturesEXT<'_>>(),
@@ -454,7 +455,7 @@ mod tests {
         assert_eq!(
             counts,
             [
-                38, 7, 43, 14, 1, 1, 1, 2, 1, 1, 2, 2, 2, 2, 1, 3, 4, 1, 13, 1, 1, 1, 1, 23
+                38, 7, 43, 14, 1, 1, 1, 2, 1, 1, 2, 2, 2, 2, 1, 1, 3, 4, 1, 14, 1, 1, 1, 1, 23
             ]
         );
         assert_eq!(count_of(&SUPPORTED), counts.iter().sum::<usize>());

@@ -313,6 +313,7 @@ static ROWS: &[Command] = rows! {
         vkCmdSetProvokingVertexModeEXT: vk::PFN_vkCmdSetProvokingVertexModeEXT = vkCmdSetProvokingVertexModeEXT;
         vkCmdSetLineRasterizationModeEXT: vk::PFN_vkCmdSetLineRasterizationModeEXT = vkCmdSetLineRasterizationModeEXT;
         vkCmdSetLineStippleEnableEXT: vk::PFN_vkCmdSetLineStippleEnableEXT = vkCmdSetLineStippleEnableEXT;
+        vkCmdSetDepthClipNegativeOneToOneEXT: vk::PFN_vkCmdSetDepthClipNegativeOneToOneEXT = vkCmdSetDepthClipNegativeOneToOneEXT;
     }
     Instance, InstanceExtension(&[c"VK_EXT_headless_surface"]) => {
         vkCreateHeadlessSurfaceEXT: vk::PFN_vkCreateHeadlessSurfaceEXT = vkCreateHeadlessSurfaceEXT;
@@ -4882,6 +4883,32 @@ unsafe extern "system" fn vkCmdSetLineStippleEnableEXT(
             })
         }
     })
+}
+
+unsafe extern "system" fn vkCmdSetDepthClipNegativeOneToOneEXT(
+    command_buffer: vk::CommandBuffer,
+    negative_one_to_one: vk::Bool32,
+) {
+    guard(
+        command_buffer,
+        "vkCmdSetDepthClipNegativeOneToOneEXT",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                record(
+                    command_buffer,
+                    "vkCmdSetDepthClipNegativeOneToOneEXT",
+                    |recorder| {
+                        let enable = negative_one_to_one != vk::FALSE;
+                        crate::command::dynamic_state::set(
+                            recorder,
+                            DynamicState::DepthClipNegativeOneToOne { enable },
+                        )
+                    },
+                )
+            }
+        },
+    )
 }
 
 unsafe extern "system" fn vkCreateHeadlessSurfaceEXT(

@@ -31,6 +31,7 @@ pub(crate) const DEVICE: &[Extension] = &[
     (c"VK_EXT_border_color_swizzle", 1),
     (c"VK_EXT_color_write_enable", 1),
     (c"VK_EXT_custom_border_color", 12),
+    (c"VK_EXT_depth_clip_control", 1),
     (c"VK_EXT_depth_clip_enable", 1),
     (c"VK_EXT_descriptor_indexing", 2),
     (c"VK_EXT_extended_dynamic_state", 1),

@@ -282,6 +282,8 @@ pub(crate) struct Features {
     pub(crate) custom_border_colors: bool,
     /// `customBorderColorWithoutFormat`.
     pub(crate) custom_border_color_without_format: bool,
+    /// `depthClipControl`.
+    pub(crate) depth_clip_control: bool,
     /// `depthClipEnable`.
     pub(crate) depth_clip_enable: bool,
     /// `extendedDynamicState`.
@@ -563,6 +565,7 @@ pub(crate) const SUPPORTED: Features = Features {
     color_write_enable: true,
     custom_border_colors: true,
     custom_border_color_without_format: true,
+    depth_clip_control: true,
     depth_clip_enable: true,
     extended_dynamic_state: true,
     extended_dynamic_state2: true,
@@ -580,6 +583,7 @@ pub(crate) const SUPPORTED: Features = Features {
     extended_dynamic_state3_provoking_vertex_mode: true,
     extended_dynamic_state3_line_rasterization_mode: true,
     extended_dynamic_state3_line_stipple_enable: true,
+    extended_dynamic_state3_depth_clip_negative_one_to_one: true,
     index_type_uint8: true,
     rectangular_lines: true,
     multi_draw: true,
@@ -762,6 +766,7 @@ impl Features {
         color_write_enable: false,
         custom_border_colors: false,
         custom_border_color_without_format: false,
+        depth_clip_control: false,
         depth_clip_enable: false,
         extended_dynamic_state: false,
         extended_dynamic_state2: false,
@@ -849,7 +854,7 @@ impl Features {
     };
 
     /// The features by their names in Rust.
-    pub(crate) fn list(&self) -> [(&'static str, bool); 220] {
+    pub(crate) fn list(&self) -> [(&'static str, bool); 221] {
         [
             ("robust_buffer_access", self.robust_buffer_access),
             ("full_draw_index_uint32", self.full_draw_index_uint32),
@@ -1170,6 +1175,7 @@ impl Features {
                 "custom_border_color_without_format",
                 self.custom_border_color_without_format,
             ),
+            ("depth_clip_control", self.depth_clip_control),
             ("depth_clip_enable", self.depth_clip_enable),
             ("extended_dynamic_state", self.extended_dynamic_state),
             ("extended_dynamic_state2", self.extended_dynamic_state2),
@@ -1867,6 +1873,9 @@ impl Features {
             out.custom_border_colors = self.custom_border_colors.into();
             out.custom_border_color_without_format = self.custom_border_color_without_format.into();
         }
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceDepthClipControlFeaturesEXT<'_>>() {
+            out.depth_clip_control = self.depth_clip_control.into();
+        }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceDepthClipEnableFeaturesEXT<'_>>() {
             out.depth_clip_enable = self.depth_clip_enable.into();
         }
@@ -2424,6 +2433,11 @@ impl Features {
                 requested.custom_border_color_without_format != vk::FALSE;
         }
         if let Some(requested) =
+            valid::cast::<vk::PhysicalDeviceDepthClipControlFeaturesEXT<'_>>(structure)
+        {
+            self.depth_clip_control |= requested.depth_clip_control != vk::FALSE;
+        }
+        if let Some(requested) =
             valid::cast::<vk::PhysicalDeviceDepthClipEnableFeaturesEXT<'_>>(structure)
         {
             self.depth_clip_enable |= requested.depth_clip_enable != vk::FALSE;
@@ -2631,6 +2645,9 @@ pub(crate) fn extension_of(structure: vk::StructureType) -> Option<&'static CStr
         }
         vk::PhysicalDeviceCustomBorderColorFeaturesEXT::STRUCTURE_TYPE => {
             Some(c"VK_EXT_custom_border_color")
+        }
+        vk::PhysicalDeviceDepthClipControlFeaturesEXT::STRUCTURE_TYPE => {
+            Some(c"VK_EXT_depth_clip_control")
         }
         vk::PhysicalDeviceDepthClipEnableFeaturesEXT::STRUCTURE_TYPE => {
             Some(c"VK_EXT_depth_clip_enable")

@@ -35,6 +35,8 @@ struct Shading {
     /// Half the viewport's extent and its middle, in framebuffer pixels.
     half: [f64; 2],
     middle: [f64; 2],
+    /// The normalized device coordinate of the near plane, 0 or -1.
+    near: f32,
     order: GaussianOrder,
     /// Where the depth key is among the varyings, if it is there.
     writes_key: bool,
@@ -220,6 +222,7 @@ impl Shading {
                 half[0] + f64::from(viewport.x),
                 half[1] + f64::from(viewport.y),
             ],
+            near: if state.negative_one_to_one { -1.0 } else { 0.0 },
             order: state.order,
             writes_key: shader.writes(gaussian::DEPTH_KEY),
             depth: set.depth,
@@ -260,7 +263,7 @@ impl Shading {
                 Some(Counter::SkippedNonFinite)
             } else if f64::from(opacity) < self.constants.alpha_floor {
                 Some(Counter::SkippedFaint)
-            } else if w <= 0.0 || z < 0.0 {
+            } else if w <= 0.0 || z < self.near * w {
                 Some(Counter::SkippedNear)
             } else if z > w {
                 Some(Counter::SkippedFar)

@@ -130,6 +130,8 @@ pub struct GaussianState {
     pub transmittance_floor: f32,
     /// How far pixels may be from all that.
     pub approximation: GaussianApproximation,
+    /// Whether depths before the viewport, and those of clip space, are from -1, not from 0, to 1.
+    pub negative_one_to_one: bool,
     /// The samples that may be covered.
     pub sample_mask: u32,
     /// Depth and stencil. Gaussians face the front.
@@ -157,6 +159,7 @@ impl Default for GaussianState {
             alpha_ceiling: 0.99,
             transmittance_floor: 1e-4,
             approximation: GaussianApproximation::default(),
+            negative_one_to_one: false,
             sample_mask: u32::MAX,
             depth_stencil: DepthStencil::default(),
             logic_op: None,

@@ -283,6 +283,8 @@ pub struct DrawState {
     pub depth_clamp: bool,
     /// Whether primitives are clipped at the near and far planes, if that doesn't follow from `depth_clamp`.
     pub depth_clip: Option<bool>,
+    /// Whether clip space's depths are from -w, not from 0, to w.
+    pub negative_one_to_one: bool,
     /// Nothing is rasterized.
     pub rasterizer_discard: bool,
     /// What of polygons is drawn.
@@ -342,6 +344,7 @@ impl DrawState {
             }],
             depth_clamp: false,
             depth_clip: None,
+            negative_one_to_one: false,
             rasterizer_discard: false,
             polygon_mode: PolygonMode::Fill,
             cull_front: false,
