@@ -13,6 +13,7 @@ mod presentation;
 mod queues;
 mod robustness;
 mod samplers;
+mod storage;
 mod window;
 #[cfg(target_os = "linux")]
 mod x11;

@@ -101,9 +101,10 @@ fn is_stored(format: Format) -> bool {
         && !format.has(Channel::X)
 }
 
-/// Tells if programs update texels atomically: integers of one word.
+/// Tells if programs update texels atomically: integers and floats of one word.
 fn is_atomic(format: Format) -> bool {
-    format.is_integer() && format.texel_size() == 4 && format.components().len() == 1
+    let is_one_word = format.texel_size() == 4 && format.components().len() == 1;
+    is_one_word && (format.is_integer() || format.numeric() == Numeric::Sfloat)
 }
 
 /// Tells if texels of a colour format are rendered to. Formats of three equal components make poor attachments:
@@ -307,8 +308,7 @@ pub(crate) fn image_properties(query: ImageQuery) -> Result<vk::ImageFormatPrope
     let has_samples = is_attachment
         && !is_linear
         && ty == vk::ImageType::TYPE_2D
-        && !flags.contains(vk::ImageCreateFlags::CUBE_COMPATIBLE)
-        && !usage.contains(vk::ImageUsageFlags::STORAGE);
+        && !flags.contains(vk::ImageCreateFlags::CUBE_COMPATIBLE);
     if is_linear && ty != vk::ImageType::TYPE_2D {
         return refuse("linear images have two dimensions".to_owned());
     }

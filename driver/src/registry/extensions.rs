@@ -54,6 +54,8 @@ pub(crate) const DEVICE: &[Extension] = &[
     (c"VK_EXT_sampler_filter_minmax", 2),
     (c"VK_EXT_scalar_block_layout", 1),
     (c"VK_EXT_separate_stencil_usage", 1),
+    (c"VK_EXT_shader_atomic_float", 1),
+    (c"VK_EXT_shader_atomic_float2", 1),
     (c"VK_EXT_shader_demote_to_helper_invocation", 1),
     (c"VK_EXT_shader_subgroup_ballot", 1),
     (c"VK_EXT_shader_subgroup_vote", 1),

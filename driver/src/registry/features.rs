@@ -386,6 +386,54 @@ pub(crate) struct Features {
     pub(crate) robust_image_access2: bool,
     /// `nullDescriptor`.
     pub(crate) null_descriptor: bool,
+    /// `shaderBufferFloat32Atomics`.
+    pub(crate) shader_buffer_float32_atomics: bool,
+    /// `shaderBufferFloat32AtomicAdd`.
+    pub(crate) shader_buffer_float32_atomic_add: bool,
+    /// `shaderBufferFloat64Atomics`.
+    pub(crate) shader_buffer_float64_atomics: bool,
+    /// `shaderBufferFloat64AtomicAdd`.
+    pub(crate) shader_buffer_float64_atomic_add: bool,
+    /// `shaderSharedFloat32Atomics`.
+    pub(crate) shader_shared_float32_atomics: bool,
+    /// `shaderSharedFloat32AtomicAdd`.
+    pub(crate) shader_shared_float32_atomic_add: bool,
+    /// `shaderSharedFloat64Atomics`.
+    pub(crate) shader_shared_float64_atomics: bool,
+    /// `shaderSharedFloat64AtomicAdd`.
+    pub(crate) shader_shared_float64_atomic_add: bool,
+    /// `shaderImageFloat32Atomics`.
+    pub(crate) shader_image_float32_atomics: bool,
+    /// `shaderImageFloat32AtomicAdd`.
+    pub(crate) shader_image_float32_atomic_add: bool,
+    /// `sparseImageFloat32Atomics`.
+    pub(crate) sparse_image_float32_atomics: bool,
+    /// `sparseImageFloat32AtomicAdd`.
+    pub(crate) sparse_image_float32_atomic_add: bool,
+    /// `shaderBufferFloat16Atomics`.
+    pub(crate) shader_buffer_float16_atomics: bool,
+    /// `shaderBufferFloat16AtomicAdd`.
+    pub(crate) shader_buffer_float16_atomic_add: bool,
+    /// `shaderBufferFloat16AtomicMinMax`.
+    pub(crate) shader_buffer_float16_atomic_min_max: bool,
+    /// `shaderBufferFloat32AtomicMinMax`.
+    pub(crate) shader_buffer_float32_atomic_min_max: bool,
+    /// `shaderBufferFloat64AtomicMinMax`.
+    pub(crate) shader_buffer_float64_atomic_min_max: bool,
+    /// `shaderSharedFloat16Atomics`.
+    pub(crate) shader_shared_float16_atomics: bool,
+    /// `shaderSharedFloat16AtomicAdd`.
+    pub(crate) shader_shared_float16_atomic_add: bool,
+    /// `shaderSharedFloat16AtomicMinMax`.
+    pub(crate) shader_shared_float16_atomic_min_max: bool,
+    /// `shaderSharedFloat32AtomicMinMax`.
+    pub(crate) shader_shared_float32_atomic_min_max: bool,
+    /// `shaderSharedFloat64AtomicMinMax`.
+    pub(crate) shader_shared_float64_atomic_min_max: bool,
+    /// `shaderImageFloat32AtomicMinMax`.
+    pub(crate) shader_image_float32_atomic_min_max: bool,
+    /// `sparseImageFloat32AtomicMinMax`.
+    pub(crate) sparse_image_float32_atomic_min_max: bool,
     /// `texelBufferAlignment`.
     pub(crate) texel_buffer_alignment: bool,
     /// `vertexAttributeInstanceRateDivisor`.
@@ -481,6 +529,7 @@ pub(crate) const SUPPORTED: Features = Features {
     fragment_stores_and_atomics: true,
     shader_image_gather_extended: true,
     shader_storage_image_extended_formats: true,
+    shader_storage_image_multisample: true,
     shader_storage_image_read_without_format: true,
     shader_storage_image_write_without_format: true,
     shader_uniform_buffer_array_dynamic_indexing: true,
@@ -592,6 +641,15 @@ pub(crate) const SUPPORTED: Features = Features {
     robust_buffer_access2: true,
     robust_image_access2: true,
     null_descriptor: true,
+    shader_buffer_float32_atomics: true,
+    shader_buffer_float32_atomic_add: true,
+    shader_shared_float32_atomics: true,
+    shader_shared_float32_atomic_add: true,
+    shader_image_float32_atomics: true,
+    shader_image_float32_atomic_add: true,
+    shader_buffer_float32_atomic_min_max: true,
+    shader_shared_float32_atomic_min_max: true,
+    shader_image_float32_atomic_min_max: true,
     texel_buffer_alignment: true,
     vertex_attribute_instance_rate_divisor: true,
     vertex_attribute_instance_rate_zero_divisor: true,
@@ -818,6 +876,30 @@ impl Features {
         robust_buffer_access2: false,
         robust_image_access2: false,
         null_descriptor: false,
+        shader_buffer_float32_atomics: false,
+        shader_buffer_float32_atomic_add: false,
+        shader_buffer_float64_atomics: false,
+        shader_buffer_float64_atomic_add: false,
+        shader_shared_float32_atomics: false,
+        shader_shared_float32_atomic_add: false,
+        shader_shared_float64_atomics: false,
+        shader_shared_float64_atomic_add: false,
+        shader_image_float32_atomics: false,
+        shader_image_float32_atomic_add: false,
+        sparse_image_float32_atomics: false,
+        sparse_image_float32_atomic_add: false,
+        shader_buffer_float16_atomics: false,
+        shader_buffer_float16_atomic_add: false,
+        shader_buffer_float16_atomic_min_max: false,
+        shader_buffer_float32_atomic_min_max: false,
+        shader_buffer_float64_atomic_min_max: false,
+        shader_shared_float16_atomics: false,
+        shader_shared_float16_atomic_add: false,
+        shader_shared_float16_atomic_min_max: false,
+        shader_shared_float32_atomic_min_max: false,
+        shader_shared_float64_atomic_min_max: false,
+        shader_image_float32_atomic_min_max: false,
+        sparse_image_float32_atomic_min_max: false,
         texel_buffer_alignment: false,
         vertex_attribute_instance_rate_divisor: false,
         vertex_attribute_instance_rate_zero_divisor: false,
@@ -854,7 +936,7 @@ impl Features {
     };
 
     /// The features by their names in Rust.
-    pub(crate) fn list(&self) -> [(&'static str, bool); 221] {
+    pub(crate) fn list(&self) -> [(&'static str, bool); 245] {
         [
             ("robust_buffer_access", self.robust_buffer_access),
             ("full_draw_index_uint32", self.full_draw_index_uint32),
@@ -1338,6 +1420,102 @@ impl Features {
             ("robust_buffer_access2", self.robust_buffer_access2),
             ("robust_image_access2", self.robust_image_access2),
             ("null_descriptor", self.null_descriptor),
+            (
+                "shader_buffer_float32_atomics",
+                self.shader_buffer_float32_atomics,
+            ),
+            (
+                "shader_buffer_float32_atomic_add",
+                self.shader_buffer_float32_atomic_add,
+            ),
+            (
+                "shader_buffer_float64_atomics",
+                self.shader_buffer_float64_atomics,
+            ),
+            (
+                "shader_buffer_float64_atomic_add",
+                self.shader_buffer_float64_atomic_add,
+            ),
+            (
+                "shader_shared_float32_atomics",
+                self.shader_shared_float32_atomics,
+            ),
+            (
+                "shader_shared_float32_atomic_add",
+                self.shader_shared_float32_atomic_add,
+            ),
+            (
+                "shader_shared_float64_atomics",
+                self.shader_shared_float64_atomics,
+            ),
+            (
+                "shader_shared_float64_atomic_add",
+                self.shader_shared_float64_atomic_add,
+            ),
+            (
+                "shader_image_float32_atomics",
+                self.shader_image_float32_atomics,
+            ),
+            (
+                "shader_image_float32_atomic_add",
+                self.shader_image_float32_atomic_add,
+            ),
+            (
+                "sparse_image_float32_atomics",
+                self.sparse_image_float32_atomics,
+            ),
+            (
+                "sparse_image_float32_atomic_add",
+                self.sparse_image_float32_atomic_add,
+            ),
+            (
+                "shader_buffer_float16_atomics",
+                self.shader_buffer_float16_atomics,
+            ),
+            (
+                "shader_buffer_float16_atomic_add",
+                self.shader_buffer_float16_atomic_add,
+            ),
+            (
+                "shader_buffer_float16_atomic_min_max",
+                self.shader_buffer_float16_atomic_min_max,
+            ),
+            (
+                "shader_buffer_float32_atomic_min_max",
+                self.shader_buffer_float32_atomic_min_max,
+            ),
+            (
+                "shader_buffer_float64_atomic_min_max",
+                self.shader_buffer_float64_atomic_min_max,
+            ),
+            (
+                "shader_shared_float16_atomics",
+                self.shader_shared_float16_atomics,
+            ),
+            (
+                "shader_shared_float16_atomic_add",
+                self.shader_shared_float16_atomic_add,
+            ),
+            (
+                "shader_shared_float16_atomic_min_max",
+                self.shader_shared_float16_atomic_min_max,
+            ),
+            (
+                "shader_shared_float32_atomic_min_max",
+                self.shader_shared_float32_atomic_min_max,
+            ),
+            (
+                "shader_shared_float64_atomic_min_max",
+                self.shader_shared_float64_atomic_min_max,
+            ),
+            (
+                "shader_image_float32_atomic_min_max",
+                self.shader_image_float32_atomic_min_max,
+            ),
+            (
+                "sparse_image_float32_atomic_min_max",
+                self.sparse_image_float32_atomic_min_max,
+            ),
             ("texel_buffer_alignment", self.texel_buffer_alignment),
             (
                 "vertex_attribute_instance_rate_divisor",
@@ -1998,6 +2176,42 @@ impl Features {
             out.robust_image_access2 = self.robust_image_access2.into();
             out.null_descriptor = self.null_descriptor.into();
         }
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceShaderAtomicFloatFeaturesEXT<'_>>() {
+            out.shader_buffer_float32_atomics = self.shader_buffer_float32_atomics.into();
+            out.shader_buffer_float32_atomic_add = self.shader_buffer_float32_atomic_add.into();
+            out.shader_buffer_float64_atomics = self.shader_buffer_float64_atomics.into();
+            out.shader_buffer_float64_atomic_add = self.shader_buffer_float64_atomic_add.into();
+            out.shader_shared_float32_atomics = self.shader_shared_float32_atomics.into();
+            out.shader_shared_float32_atomic_add = self.shader_shared_float32_atomic_add.into();
+            out.shader_shared_float64_atomics = self.shader_shared_float64_atomics.into();
+            out.shader_shared_float64_atomic_add = self.shader_shared_float64_atomic_add.into();
+            out.shader_image_float32_atomics = self.shader_image_float32_atomics.into();
+            out.shader_image_float32_atomic_add = self.shader_image_float32_atomic_add.into();
+            out.sparse_image_float32_atomics = self.sparse_image_float32_atomics.into();
+            out.sparse_image_float32_atomic_add = self.sparse_image_float32_atomic_add.into();
+        }
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceShaderAtomicFloat2FeaturesEXT<'_>>() {
+            out.shader_buffer_float16_atomics = self.shader_buffer_float16_atomics.into();
+            out.shader_buffer_float16_atomic_add = self.shader_buffer_float16_atomic_add.into();
+            out.shader_buffer_float16_atomic_min_max =
+                self.shader_buffer_float16_atomic_min_max.into();
+            out.shader_buffer_float32_atomic_min_max =
+                self.shader_buffer_float32_atomic_min_max.into();
+            out.shader_buffer_float64_atomic_min_max =
+                self.shader_buffer_float64_atomic_min_max.into();
+            out.shader_shared_float16_atomics = self.shader_shared_float16_atomics.into();
+            out.shader_shared_float16_atomic_add = self.shader_shared_float16_atomic_add.into();
+            out.shader_shared_float16_atomic_min_max =
+                self.shader_shared_float16_atomic_min_max.into();
+            out.shader_shared_float32_atomic_min_max =
+                self.shader_shared_float32_atomic_min_max.into();
+            out.shader_shared_float64_atomic_min_max =
+                self.shader_shared_float64_atomic_min_max.into();
+            out.shader_image_float32_atomic_min_max =
+                self.shader_image_float32_atomic_min_max.into();
+            out.sparse_image_float32_atomic_min_max =
+                self.sparse_image_float32_atomic_min_max.into();
+        }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceTexelBufferAlignmentFeaturesEXT<'_>>()
         {
             out.texel_buffer_alignment = self.texel_buffer_alignment.into();
@@ -2565,6 +2779,62 @@ impl Features {
             self.null_descriptor |= requested.null_descriptor != vk::FALSE;
         }
         if let Some(requested) =
+            valid::cast::<vk::PhysicalDeviceShaderAtomicFloatFeaturesEXT<'_>>(structure)
+        {
+            self.shader_buffer_float32_atomics |=
+                requested.shader_buffer_float32_atomics != vk::FALSE;
+            self.shader_buffer_float32_atomic_add |=
+                requested.shader_buffer_float32_atomic_add != vk::FALSE;
+            self.shader_buffer_float64_atomics |=
+                requested.shader_buffer_float64_atomics != vk::FALSE;
+            self.shader_buffer_float64_atomic_add |=
+                requested.shader_buffer_float64_atomic_add != vk::FALSE;
+            self.shader_shared_float32_atomics |=
+                requested.shader_shared_float32_atomics != vk::FALSE;
+            self.shader_shared_float32_atomic_add |=
+                requested.shader_shared_float32_atomic_add != vk::FALSE;
+            self.shader_shared_float64_atomics |=
+                requested.shader_shared_float64_atomics != vk::FALSE;
+            self.shader_shared_float64_atomic_add |=
+                requested.shader_shared_float64_atomic_add != vk::FALSE;
+            self.shader_image_float32_atomics |=
+                requested.shader_image_float32_atomics != vk::FALSE;
+            self.shader_image_float32_atomic_add |=
+                requested.shader_image_float32_atomic_add != vk::FALSE;
+            self.sparse_image_float32_atomics |=
+                requested.sparse_image_float32_atomics != vk::FALSE;
+            self.sparse_image_float32_atomic_add |=
+                requested.sparse_image_float32_atomic_add != vk::FALSE;
+        }
+        if let Some(requested) =
+            valid::cast::<vk::PhysicalDeviceShaderAtomicFloat2FeaturesEXT<'_>>(structure)
+        {
+            self.shader_buffer_float16_atomics |=
+                requested.shader_buffer_float16_atomics != vk::FALSE;
+            self.shader_buffer_float16_atomic_add |=
+                requested.shader_buffer_float16_atomic_add != vk::FALSE;
+            self.shader_buffer_float16_atomic_min_max |=
+                requested.shader_buffer_float16_atomic_min_max != vk::FALSE;
+            self.shader_buffer_float32_atomic_min_max |=
+                requested.shader_buffer_float32_atomic_min_max != vk::FALSE;
+            self.shader_buffer_float64_atomic_min_max |=
+                requested.shader_buffer_float64_atomic_min_max != vk::FALSE;
+            self.shader_shared_float16_atomics |=
+                requested.shader_shared_float16_atomics != vk::FALSE;
+            self.shader_shared_float16_atomic_add |=
+                requested.shader_shared_float16_atomic_add != vk::FALSE;
+            self.shader_shared_float16_atomic_min_max |=
+                requested.shader_shared_float16_atomic_min_max != vk::FALSE;
+            self.shader_shared_float32_atomic_min_max |=
+                requested.shader_shared_float32_atomic_min_max != vk::FALSE;
+            self.shader_shared_float64_atomic_min_max |=
+                requested.shader_shared_float64_atomic_min_max != vk::FALSE;
+            self.shader_image_float32_atomic_min_max |=
+                requested.shader_image_float32_atomic_min_max != vk::FALSE;
+            self.sparse_image_float32_atomic_min_max |=
+                requested.sparse_image_float32_atomic_min_max != vk::FALSE;
+        }
+        if let Some(requested) =
             valid::cast::<vk::PhysicalDeviceTexelBufferAlignmentFeaturesEXT<'_>>(structure)
         {
             self.texel_buffer_alignment |= requested.texel_buffer_alignment != vk::FALSE;
@@ -2675,6 +2945,12 @@ pub(crate) fn extension_of(structure: vk::StructureType) -> Option<&'static CStr
             Some(c"VK_EXT_provoking_vertex")
         }
         vk::PhysicalDeviceRobustness2FeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_robustness2"),
+        vk::PhysicalDeviceShaderAtomicFloatFeaturesEXT::STRUCTURE_TYPE => {
+            Some(c"VK_EXT_shader_atomic_float")
+        }
+        vk::PhysicalDeviceShaderAtomicFloat2FeaturesEXT::STRUCTURE_TYPE => {
+            Some(c"VK_EXT_shader_atomic_float2")
+        }
         vk::PhysicalDeviceTexelBufferAlignmentFeaturesEXT::STRUCTURE_TYPE => {
             Some(c"VK_EXT_texel_buffer_alignment")
         }
