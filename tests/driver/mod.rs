@@ -2,6 +2,7 @@
 //! for, each held against what a program gets of it.
 
 mod addresses;
+mod conditional;
 mod depth_clip;
 mod descriptors;
 mod dynamic;

@@ -2,7 +2,7 @@
 
 use ash::vk;
 use gaurast_testkit::{
-    Bindings, Buffer, Gpu, Image, ImageOptions, Kernel, Resource, device_format,
+    Bindings, Buffer, Gpu, Image, ImageOptions, Kernel, Resource, Sampler, device_format,
 };
 use simdevice::Format;
 use simdevice::format::Numeric;
@@ -209,6 +209,86 @@ fn every_kind_of_image_is_stored_to_without_a_format() {
                 assert_eq!(texel, &expected[..size], "{kind}, {format:?}, {at:?}");
             }
         }
+    }
+}
+
+/// A slice of a 3D image is stored to and sampled as an image of two dimensions.
+#[gaurast_runner::test(needs = [GLSLANG])]
+fn slices_are_images_of_two_dimensions() {
+    let mut features = vk::PhysicalDeviceImage2DViewOf3DFeaturesEXT::default()
+        .image2_d_view_of3_d(true)
+        .sampler2_d_view_of3_d(true);
+    let gpu =
+        &Gpu::extended(&[ash::ext::image_2d_view_of_3d::NAME], &mut features).expect("a device");
+    let options = ImageOptions {
+        size: [8, 4, 5],
+        view: vk::ImageViewType::TYPE_3D,
+        flags: vk::ImageCreateFlags::TYPE_2D_VIEW_COMPATIBLE_EXT,
+        ..ImageOptions::new(
+            vk::Format::R32_SFLOAT,
+            [8, 4],
+            Usage::STORAGE | Usage::SAMPLED,
+        )
+    };
+    let image = Image::new(gpu, &options);
+    let before: Vec<f32> = (0..160).map(|texel| texel as f32).collect();
+    image.upload(vk::ImageAspectFlags::COLOR, bytemuck::cast_slice(&before));
+    let view = |slice| {
+        let info = vk::ImageViewCreateInfo::default()
+            .image(image.raw)
+            .view_type(vk::ImageViewType::TYPE_2D)
+            .format(vk::Format::R32_SFLOAT)
+            .subresource_range(vk::ImageSubresourceRange {
+                base_array_layer: slice,
+                layer_count: 1,
+                ..gaurast_testkit::range(vk::ImageAspectFlags::COLOR)
+            });
+        // SAFETY: the image is alive.
+        unsafe { gpu.device().create_image_view(&info, None) }.expect("a view")
+    };
+    let (written, sampled) = (view(2), view(3));
+    let sampler = Sampler::new(
+        gpu,
+        &vk::SamplerCreateInfo::default()
+            .mag_filter(vk::Filter::LINEAR)
+            .min_filter(vk::Filter::LINEAR),
+    );
+    let results = Buffer::new(gpu, 4 * 32);
+    let bindings = Bindings::new(
+        gpu,
+        &[
+            Resource::StorageImage(written),
+            Resource::Texture(sampled, sampler.raw),
+            Resource::Storage(results.raw),
+        ],
+    );
+    let kernel = Kernel::new(
+        gpu,
+        "layout(local_size_x = 8, local_size_y = 4) in;
+        layout(binding = 0, r32f) uniform image2D written;
+        layout(binding = 1) uniform sampler2D sampled;
+        layout(binding = 2) buffer Results { float results[]; };
+        void main() {
+            ivec2 at = ivec2(gl_GlobalInvocationID.xy);
+            imageStore(written, at, imageLoad(written, at) + 1000.0 * imageSize(written).y);
+            results[at.y * 8 + at.x] = textureLod(sampled, (vec2(at) + 0.5) / vec2(8.0, 4.0), 0.0).x;
+        }",
+        &bindings,
+    );
+    kernel.run(&[bindings.set], &[], [1, 1, 1]);
+    let after = image.colors::<f32>();
+    for (texel, value) in after.into_iter().enumerate() {
+        let expected = match texel {
+            64..96 => before[texel] + 4000.0,
+            _ => before[texel],
+        };
+        assert_eq!(value, expected, "texel {texel}");
+    }
+    assert_eq!(results.values::<f32>(), before[96..128]);
+    // SAFETY: nothing uses the views any more.
+    unsafe {
+        gpu.device().destroy_image_view(written, None);
+        gpu.device().destroy_image_view(sampled, None);
     }
 }
 

@@ -9,6 +9,10 @@
     clippy::semicolon_if_nothing_returned,
     reason = "functions return what their guards do"
 )]
+#![allow(
+    clippy::redundant_closure,
+    reason = "all commands are recorded in closures"
+)]
 
 use super::lookup::Availability::{Core, DeviceExtension, InstanceExtension};
 use super::lookup::{Command, Commands, Scope, rows};
@@ -260,6 +264,10 @@ static ROWS: &[Command] = rows! {
     }
     Device, DeviceExtension(&[c"VK_EXT_color_write_enable"]) => {
         vkCmdSetColorWriteEnableEXT: vk::PFN_vkCmdSetColorWriteEnableEXT = vkCmdSetColorWriteEnableEXT;
+    }
+    Device, DeviceExtension(&[c"VK_EXT_conditional_rendering"]) => {
+        vkCmdBeginConditionalRenderingEXT: vk::PFN_vkCmdBeginConditionalRenderingEXT = vkCmdBeginConditionalRenderingEXT;
+        vkCmdEndConditionalRenderingEXT: vk::PFN_vkCmdEndConditionalRenderingEXT = vkCmdEndConditionalRenderingEXT;
     }
     Device, InstanceExtension(&[c"VK_EXT_debug_utils"]) => {
         vkSetDebugUtilsObjectNameEXT: vk::PFN_vkSetDebugUtilsObjectNameEXT = vkSetDebugUtilsObjectNameEXT;
@@ -4455,6 +4463,40 @@ unsafe extern "system" fn vkCmdSetColorWriteEnableEXT(
                     valid::slice(p_color_write_enables, attachment_count)?,
                 )
             })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdBeginConditionalRenderingEXT(
+    command_buffer: vk::CommandBuffer,
+    p_conditional_rendering_begin: *const vk::ConditionalRenderingBeginInfoEXT<'_>,
+) {
+    guard(command_buffer, "vkCmdBeginConditionalRenderingEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(
+                command_buffer,
+                "vkCmdBeginConditionalRenderingEXT",
+                |recorder| {
+                    crate::command::conditional::cmd_begin_conditional_rendering(
+                        recorder,
+                        valid::input(p_conditional_rendering_begin)?,
+                    )
+                },
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdEndConditionalRenderingEXT(command_buffer: vk::CommandBuffer) {
+    guard(command_buffer, "vkCmdEndConditionalRenderingEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(
+                command_buffer,
+                "vkCmdEndConditionalRenderingEXT",
+                |recorder| crate::command::conditional::cmd_end_conditional_rendering(recorder),
+            )
         }
     })
 }

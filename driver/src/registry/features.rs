@@ -278,6 +278,10 @@ pub(crate) struct Features {
     pub(crate) border_color_swizzle_from_image: bool,
     /// `colorWriteEnable`.
     pub(crate) color_write_enable: bool,
+    /// `conditionalRendering`.
+    pub(crate) conditional_rendering: bool,
+    /// `inheritedConditionalRendering`.
+    pub(crate) inherited_conditional_rendering: bool,
     /// `customBorderColors`.
     pub(crate) custom_border_colors: bool,
     /// `customBorderColorWithoutFormat`.
@@ -356,6 +360,10 @@ pub(crate) struct Features {
     pub(crate) extended_dynamic_state3_representative_fragment_test_enable: bool,
     /// `extendedDynamicState3ShadingRateImageEnable`.
     pub(crate) extended_dynamic_state3_shading_rate_image_enable: bool,
+    /// `image2DViewOf3D`.
+    pub(crate) image2_d_view_of3_d: bool,
+    /// `sampler2DViewOf3D`.
+    pub(crate) sampler2_d_view_of3_d: bool,
     /// `indexTypeUint8`.
     pub(crate) index_type_uint8: bool,
     /// `rectangularLines`.
@@ -372,6 +380,8 @@ pub(crate) struct Features {
     pub(crate) stippled_smooth_lines: bool,
     /// `multiDraw`.
     pub(crate) multi_draw: bool,
+    /// `nonSeamlessCubeMap`.
+    pub(crate) non_seamless_cube_map: bool,
     /// `primitiveTopologyListRestart`.
     pub(crate) primitive_topology_list_restart: bool,
     /// `primitiveTopologyPatchListRestart`.
@@ -612,6 +622,8 @@ pub(crate) const SUPPORTED: Features = Features {
     border_color_swizzle: true,
     border_color_swizzle_from_image: true,
     color_write_enable: true,
+    conditional_rendering: true,
+    inherited_conditional_rendering: true,
     custom_border_colors: true,
     custom_border_color_without_format: true,
     depth_clip_control: true,
@@ -633,9 +645,12 @@ pub(crate) const SUPPORTED: Features = Features {
     extended_dynamic_state3_line_rasterization_mode: true,
     extended_dynamic_state3_line_stipple_enable: true,
     extended_dynamic_state3_depth_clip_negative_one_to_one: true,
+    image2_d_view_of3_d: true,
+    sampler2_d_view_of3_d: true,
     index_type_uint8: true,
     rectangular_lines: true,
     multi_draw: true,
+    non_seamless_cube_map: true,
     primitive_topology_list_restart: true,
     provoking_vertex_last: true,
     robust_buffer_access2: true,
@@ -822,6 +837,8 @@ impl Features {
         border_color_swizzle: false,
         border_color_swizzle_from_image: false,
         color_write_enable: false,
+        conditional_rendering: false,
+        inherited_conditional_rendering: false,
         custom_border_colors: false,
         custom_border_color_without_format: false,
         depth_clip_control: false,
@@ -861,6 +878,8 @@ impl Features {
         extended_dynamic_state3_coverage_reduction_mode: false,
         extended_dynamic_state3_representative_fragment_test_enable: false,
         extended_dynamic_state3_shading_rate_image_enable: false,
+        image2_d_view_of3_d: false,
+        sampler2_d_view_of3_d: false,
         index_type_uint8: false,
         rectangular_lines: false,
         bresenham_lines: false,
@@ -869,6 +888,7 @@ impl Features {
         stippled_bresenham_lines: false,
         stippled_smooth_lines: false,
         multi_draw: false,
+        non_seamless_cube_map: false,
         primitive_topology_list_restart: false,
         primitive_topology_patch_list_restart: false,
         provoking_vertex_last: false,
@@ -936,7 +956,7 @@ impl Features {
     };
 
     /// The features by their names in Rust.
-    pub(crate) fn list(&self) -> [(&'static str, bool); 245] {
+    pub(crate) fn list(&self) -> [(&'static str, bool); 250] {
         [
             ("robust_buffer_access", self.robust_buffer_access),
             ("full_draw_index_uint32", self.full_draw_index_uint32),
@@ -1252,6 +1272,11 @@ impl Features {
                 self.border_color_swizzle_from_image,
             ),
             ("color_write_enable", self.color_write_enable),
+            ("conditional_rendering", self.conditional_rendering),
+            (
+                "inherited_conditional_rendering",
+                self.inherited_conditional_rendering,
+            ),
             ("custom_border_colors", self.custom_border_colors),
             (
                 "custom_border_color_without_format",
@@ -1393,6 +1418,8 @@ impl Features {
                 "extended_dynamic_state3_shading_rate_image_enable",
                 self.extended_dynamic_state3_shading_rate_image_enable,
             ),
+            ("image2_d_view_of3_d", self.image2_d_view_of3_d),
+            ("sampler2_d_view_of3_d", self.sampler2_d_view_of3_d),
             ("index_type_uint8", self.index_type_uint8),
             ("rectangular_lines", self.rectangular_lines),
             ("bresenham_lines", self.bresenham_lines),
@@ -1404,6 +1431,7 @@ impl Features {
             ("stippled_bresenham_lines", self.stippled_bresenham_lines),
             ("stippled_smooth_lines", self.stippled_smooth_lines),
             ("multi_draw", self.multi_draw),
+            ("non_seamless_cube_map", self.non_seamless_cube_map),
             (
                 "primitive_topology_list_restart",
                 self.primitive_topology_list_restart,
@@ -2047,6 +2075,11 @@ impl Features {
         if let Some(out) = structure.cast::<vk::PhysicalDeviceColorWriteEnableFeaturesEXT<'_>>() {
             out.color_write_enable = self.color_write_enable.into();
         }
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceConditionalRenderingFeaturesEXT<'_>>()
+        {
+            out.conditional_rendering = self.conditional_rendering.into();
+            out.inherited_conditional_rendering = self.inherited_conditional_rendering.into();
+        }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceCustomBorderColorFeaturesEXT<'_>>() {
             out.custom_border_colors = self.custom_border_colors.into();
             out.custom_border_color_without_format = self.custom_border_color_without_format.into();
@@ -2145,6 +2178,10 @@ impl Features {
                 .extended_dynamic_state3_shading_rate_image_enable
                 .into();
         }
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceImage2DViewOf3DFeaturesEXT<'_>>() {
+            out.image2_d_view_of3_d = self.image2_d_view_of3_d.into();
+            out.sampler2_d_view_of3_d = self.sampler2_d_view_of3_d.into();
+        }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceIndexTypeUint8FeaturesKHR<'_>>() {
             out.index_type_uint8 = self.index_type_uint8.into();
         }
@@ -2158,6 +2195,9 @@ impl Features {
         }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceMultiDrawFeaturesEXT<'_>>() {
             out.multi_draw = self.multi_draw.into();
+        }
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceNonSeamlessCubeMapFeaturesEXT<'_>>() {
+            out.non_seamless_cube_map = self.non_seamless_cube_map.into();
         }
         if let Some(out) =
             structure.cast::<vk::PhysicalDevicePrimitiveTopologyListRestartFeaturesEXT<'_>>()
@@ -2640,6 +2680,13 @@ impl Features {
             self.color_write_enable |= requested.color_write_enable != vk::FALSE;
         }
         if let Some(requested) =
+            valid::cast::<vk::PhysicalDeviceConditionalRenderingFeaturesEXT<'_>>(structure)
+        {
+            self.conditional_rendering |= requested.conditional_rendering != vk::FALSE;
+            self.inherited_conditional_rendering |=
+                requested.inherited_conditional_rendering != vk::FALSE;
+        }
+        if let Some(requested) =
             valid::cast::<vk::PhysicalDeviceCustomBorderColorFeaturesEXT<'_>>(structure)
         {
             self.custom_border_colors |= requested.custom_border_colors != vk::FALSE;
@@ -2737,6 +2784,12 @@ impl Features {
                 requested.extended_dynamic_state3_shading_rate_image_enable != vk::FALSE;
         }
         if let Some(requested) =
+            valid::cast::<vk::PhysicalDeviceImage2DViewOf3DFeaturesEXT<'_>>(structure)
+        {
+            self.image2_d_view_of3_d |= requested.image2_d_view_of3_d != vk::FALSE;
+            self.sampler2_d_view_of3_d |= requested.sampler2_d_view_of3_d != vk::FALSE;
+        }
+        if let Some(requested) =
             valid::cast::<vk::PhysicalDeviceIndexTypeUint8FeaturesKHR<'_>>(structure)
         {
             self.index_type_uint8 |= requested.index_type_uint8 != vk::FALSE;
@@ -2755,6 +2808,11 @@ impl Features {
             valid::cast::<vk::PhysicalDeviceMultiDrawFeaturesEXT<'_>>(structure)
         {
             self.multi_draw |= requested.multi_draw != vk::FALSE;
+        }
+        if let Some(requested) =
+            valid::cast::<vk::PhysicalDeviceNonSeamlessCubeMapFeaturesEXT<'_>>(structure)
+        {
+            self.non_seamless_cube_map |= requested.non_seamless_cube_map != vk::FALSE;
         }
         if let Some(requested) =
             valid::cast::<vk::PhysicalDevicePrimitiveTopologyListRestartFeaturesEXT<'_>>(structure)
@@ -2913,6 +2971,9 @@ pub(crate) fn extension_of(structure: vk::StructureType) -> Option<&'static CStr
         vk::PhysicalDeviceColorWriteEnableFeaturesEXT::STRUCTURE_TYPE => {
             Some(c"VK_EXT_color_write_enable")
         }
+        vk::PhysicalDeviceConditionalRenderingFeaturesEXT::STRUCTURE_TYPE => {
+            Some(c"VK_EXT_conditional_rendering")
+        }
         vk::PhysicalDeviceCustomBorderColorFeaturesEXT::STRUCTURE_TYPE => {
             Some(c"VK_EXT_custom_border_color")
         }
@@ -2931,6 +2992,9 @@ pub(crate) fn extension_of(structure: vk::StructureType) -> Option<&'static CStr
         vk::PhysicalDeviceExtendedDynamicState3FeaturesEXT::STRUCTURE_TYPE => {
             Some(c"VK_EXT_extended_dynamic_state3")
         }
+        vk::PhysicalDeviceImage2DViewOf3DFeaturesEXT::STRUCTURE_TYPE => {
+            Some(c"VK_EXT_image_2d_view_of_3d")
+        }
         vk::PhysicalDeviceIndexTypeUint8FeaturesKHR::STRUCTURE_TYPE => {
             Some(c"VK_EXT_index_type_uint8")
         }
@@ -2938,6 +3002,9 @@ pub(crate) fn extension_of(structure: vk::StructureType) -> Option<&'static CStr
             Some(c"VK_EXT_line_rasterization")
         }
         vk::PhysicalDeviceMultiDrawFeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_multi_draw"),
+        vk::PhysicalDeviceNonSeamlessCubeMapFeaturesEXT::STRUCTURE_TYPE => {
+            Some(c"VK_EXT_non_seamless_cube_map")
+        }
         vk::PhysicalDevicePrimitiveTopologyListRestartFeaturesEXT::STRUCTURE_TYPE => {
             Some(c"VK_EXT_primitive_topology_list_restart")
         }

@@ -22,7 +22,7 @@ pub enum MipmapMode {
     Linear,
 }
 
-/// What coordinates outside the image mean, along one axis. Cubes have no outside and ignore it.
+/// What coordinates outside the image mean, along one axis. Cubes without seams have no outside and ignore it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum AddressMode {
     /// The image repeats.
@@ -94,6 +94,8 @@ pub struct Sampler {
     pub compare_op: Option<CompareOp>,
     /// The colour outside.
     pub border_color: BorderColor,
+    /// Whether a cube's faces are images of their own, each with an outside.
+    pub has_seams: bool,
     /// Coordinates count texels of the view's first level, the only one that is read.
     pub unnormalized_coordinates: bool,
     /// The most samples along a pixel's footprint; at 1 filtering is isotropic.
@@ -114,6 +116,7 @@ impl Default for Sampler {
             max_lod: f32::MAX,
             compare_op: None,
             border_color: BorderColor::default(),
+            has_seams: false,
             unnormalized_coordinates: false,
             max_anisotropy: 1.0,
             reduction: Reduction::default(),
