@@ -442,7 +442,13 @@ mod tests {
             count::<vk::PhysicalDeviceBorderColorSwizzleFeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceCustomBorderColorFeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceDepthClipEnableFeaturesEXT<'_>>(),
+            count::<vk::PhysicalDeviceDepthClipControlFeaturesEXT<'_>>(),
+            count::<vk::PhysicalDeviceConditionalRenderingFeaturesEXT<'_>>(),
+            count::<vk::PhysicalDeviceImage2DViewOf3DFeaturesEXT<'_>>(),
+            count::<vk::PhysicalDeviceNonSeamlessCubeMapFeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceRobustness2FeaturesEXT<'_>>(),
+            count::<vk::PhysicalDeviceShaderAtomicFloatFeaturesEXT<'_>>(),
+            count::<vk::PhysicalDeviceShaderAtomicFloat2FeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceWorkgroupMemoryExplicitLayoutFeaturesKHR<'_>>(),
             count::<vk::PhysicalDeviceColorWriteEnableFeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceExtendedDynamicState3FeaturesEXT<'_>>(),
@@ -455,7 +461,8 @@ mod tests {
         assert_eq!(
             counts,
             [
-                38, 7, 43, 14, 1, 1, 1, 2, 1, 1, 2, 2, 2, 2, 1, 3, 4, 1, 13, 1, 1, 1, 1, 23
+                39, 7, 43, 14, 1, 1, 1, 2, 1, 1, 2, 2, 2, 2, 1, 1, 2, 2, 1, 3, 6, 3, 4, 1, 14, 1,
+                1, 1, 1, 23
             ]
         );
         assert_eq!(count_of(&SUPPORTED), counts.iter().sum::<usize>());

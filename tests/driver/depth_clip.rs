@@ -1,4 +1,4 @@
-//! Clipping at the near and far planes, on or off, with and without depth clamp.
+//! Near and far planes that clip, or don't, whether or not depth is clamped; and a near plane at -w.
 
 use ash::vk;
 use gaurast_testkit::{
@@ -83,4 +83,73 @@ fn planes_clip_as_the_pipeline_says() {
         }
     }
     assert_eq!(depth_seen(&gpu, false, Some(true), 0.5), Some(0.5));
+}
+
+/// The depths of fragments of a target whose every pixel is covered at depth `z` with a w of 2, in a viewport whose depths
+/// are a quarter to three quarters; None where it is clipped.
+fn depth_in_viewport(gpu: &Gpu, negative_one_to_one: bool, z: f32) -> Option<f32> {
+    let target = Target::new(
+        gpu,
+        &TargetOptions {
+            size: [4, 4],
+            ..TargetOptions::of(vk::Format::R32_SFLOAT)
+        },
+    );
+    let options = PipelineOptions {
+        vertex: "layout(location = 0) in vec4 position;
+                 void main() { gl_Position = position; }",
+        fragment: Some(
+            "layout(location = 0) out vec4 color;
+             void main() { color = vec4(gl_FragCoord.z); }",
+        ),
+        negative_one_to_one,
+        ..PipelineOptions::default()
+    };
+    let pipeline = Pipeline::new(gpu, &target, &options);
+    let vertex = |x: f32, y: f32| Vertex {
+        position: [2.0 * x, 2.0 * y, 2.0 * z, 2.0],
+        color: [0.0; 4],
+    };
+    let vertices = Buffer::of(
+        gpu,
+        &[vertex(-1.0, -1.0), vertex(3.0, -1.0), vertex(-1.0, 3.0)],
+    );
+    let pass = Pass {
+        color: vk::ClearColorValue {
+            float32: [100.0; 4],
+        },
+        ..Pass::default()
+    };
+    gpu.run(|commands| {
+        commands.pass(&target, &pass, || {
+            commands.bind(&pipeline);
+            commands.viewport([0.0, 0.0, 4.0, 4.0], [0.25, 0.75]);
+            commands.vertices(&vertices);
+            commands.draw(0..3);
+        });
+    });
+    let found: Vec<f32> =
+        bytemuck::pod_collect_to_vec(&target.colors[0].read(vk::ImageAspectFlags::COLOR, 4));
+    assert!(found.iter().all(|depth| depth == &found[0]), "{found:?}");
+    (found[0] != 100.0).then_some(found[0])
+}
+
+#[gaurast_runner::test(needs = [GLSLANG])]
+fn clip_space_begins_at_minus_w_where_the_pipeline_says_so() {
+    let mut features =
+        vk::PhysicalDeviceDepthClipControlFeaturesEXT::default().depth_clip_control(true);
+    let gpu =
+        Gpu::extended(&[ash::ext::depth_clip_control::NAME], &mut features).expect("a device");
+    for (z, from_zero, from_minus_one) in [
+        (-1.25, None, None),
+        (-1.0, None, Some(0.25)),
+        (-0.5, None, Some(0.375)),
+        (0.0, Some(0.25), Some(0.5)),
+        (0.5, Some(0.5), Some(0.625)),
+        (1.0, Some(0.75), Some(0.75)),
+        (1.25, None, None),
+    ] {
+        assert_eq!(depth_in_viewport(&gpu, false, z), from_zero, "{z}");
+        assert_eq!(depth_in_viewport(&gpu, true, z), from_minus_one, "{z}");
+    }
 }

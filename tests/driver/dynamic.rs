@@ -31,6 +31,8 @@ impl Device {
             vk::PhysicalDeviceColorWriteEnableFeaturesEXT::default().color_write_enable(true);
         let mut clip =
             vk::PhysicalDeviceDepthClipEnableFeaturesEXT::default().depth_clip_enable(true);
+        let mut control =
+            vk::PhysicalDeviceDepthClipControlFeaturesEXT::default().depth_clip_control(true);
         let mut logic = vk::PhysicalDeviceExtendedDynamicState2FeaturesEXT::default()
             .extended_dynamic_state2(true)
             .extended_dynamic_state2_logic_op(true);
@@ -48,6 +50,7 @@ impl Device {
             .extended_dynamic_state3_color_write_mask(true)
             .extended_dynamic_state3_depth_clamp_enable(true)
             .extended_dynamic_state3_depth_clip_enable(true)
+            .extended_dynamic_state3_depth_clip_negative_one_to_one(true)
             .extended_dynamic_state3_line_rasterization_mode(true)
             .extended_dynamic_state3_logic_op_enable(true)
             .extended_dynamic_state3_polygon_mode(true)
@@ -56,7 +59,8 @@ impl Device {
         input.p_next = (&raw mut multi).cast();
         writes.p_next = (&raw mut input).cast();
         clip.p_next = (&raw mut writes).cast();
-        logic.p_next = (&raw mut clip).cast();
+        control.p_next = (&raw mut clip).cast();
+        logic.p_next = (&raw mut control).cast();
         provoking.p_next = (&raw mut logic).cast();
         restart.p_next = (&raw mut provoking).cast();
         lines.p_next = (&raw mut restart).cast();
@@ -68,6 +72,7 @@ impl Device {
             ash::ext::vertex_input_dynamic_state::NAME,
             ash::ext::multi_draw::NAME,
             ash::ext::depth_clip_enable::NAME,
+            ash::ext::depth_clip_control::NAME,
             ash::ext::provoking_vertex::NAME,
             ash::ext::primitive_topology_list_restart::NAME,
             ash::ext::line_rasterization::NAME,
@@ -232,6 +237,27 @@ fn cases() -> Vec<Case> {
             // SAFETY: see above.
             |device, c, on| unsafe { device.states.cmd_set_depth_clip_enable(c, on) },
         ),
+        Case {
+            // Before zero, and beyond it.
+            base: |options| {
+                options.vertex = "layout(location = 0) in vec4 position;
+                    layout(location = 1) in vec4 color;
+                    layout(location = 0) out vec4 v_color;
+                    void main() {
+                        gl_Position = position - vec4(0.0, 0.0, 1.0, 0.0);
+                        v_color = color;
+                    }";
+            },
+            ..case(
+                S::DEPTH_CLIP_NEGATIVE_ONE_TO_ONE_EXT,
+                1,
+                |options, on| options.negative_one_to_one = on,
+                // SAFETY: see above.
+                |device, c, on| unsafe {
+                    device.states.cmd_set_depth_clip_negative_one_to_one(c, on);
+                },
+            )
+        },
         Case {
             base: |options| {
                 options.vertex = "layout(location = 0) in vec4 position;

@@ -2,6 +2,7 @@
 //! common programs ask for. Each is tested by a program that uses it.
 
 mod addresses;
+mod conditional;
 mod depth_clip;
 mod descriptors;
 mod dynamic;
@@ -13,6 +14,7 @@ mod presentation;
 mod queues;
 mod robustness;
 mod samplers;
+mod storage;
 mod window;
 #[cfg(target_os = "linux")]
 mod x11;

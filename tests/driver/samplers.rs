@@ -180,3 +180,68 @@ fn components_of_four_bits_have_their_places() {
         }
     }
 }
+
+/// Across a cube's edge lies the next face, or, with seams, what the address mode says of the face alone.
+#[gaurast_runner::test(needs = [GLSLANG])]
+fn cubes_may_have_seams() {
+    let mut features =
+        vk::PhysicalDeviceNonSeamlessCubeMapFeaturesEXT::default().non_seamless_cube_map(true);
+    let gpu =
+        &Gpu::extended(&[ash::ext::non_seamless_cube_map::NAME], &mut features).expect("a device");
+    let options = ImageOptions {
+        layers: 6,
+        view: vk::ImageViewType::CUBE,
+        ..ImageOptions::new(vk::Format::R32_SFLOAT, [2; 2], vk::ImageUsageFlags::SAMPLED)
+    };
+    // Columns of each face differ: 10 times its number, and one more.
+    let texels: Vec<f32> = (0..24)
+        .map(|texel| (10 * (texel / 4) + texel % 2) as f32)
+        .collect();
+    let image = Image::textured(gpu, &options, &[texels]);
+    let found = |flags, mode, code: &str| {
+        let info = linear()
+            .flags(flags)
+            .address_mode_u(mode)
+            .address_mode_v(mode)
+            .border_color(vk::BorderColor::FLOAT_OPAQUE_WHITE);
+        let sampler = Sampler::new(gpu, &info);
+        let result = Buffer::new(gpu, 16);
+        let resources = [
+            Resource::Storage(result.raw),
+            Resource::Texture(image.view, sampler.raw),
+        ];
+        let bindings = Bindings::new(gpu, &resources);
+        let kernel = Kernel::new(
+            gpu,
+            &format!(
+                "layout(local_size_x = 1) in;
+                 layout(binding = 0) buffer Out {{ vec4 found; }};
+                 layout(binding = 1) uniform samplerCube image;
+                 void main() {{ found = {code}; }}"
+            ),
+            &bindings,
+        );
+        kernel.run(&[bindings.set], &[], [1, 1, 1]);
+        let [x, ..]: [f32; 4] = bytemuck::pod_read_unaligned(&result.read());
+        x
+    };
+    use vk::SamplerAddressMode as Mode;
+    let (seamless, seams) = (
+        vk::SamplerCreateFlags::empty(),
+        vk::SamplerCreateFlags::NON_SEAMLESS_CUBE_MAP_EXT,
+    );
+    // At the left edge of +X, whose neighbour is +Z, in the middle of the edge.
+    let edge = "textureLod(image, vec3(1.0, 0.0, 1.0 - 1e-6), 0.0)";
+    let across = found(seamless, Mode::CLAMP_TO_EDGE, edge);
+    assert!((across - 0.5 * (0.0 + 41.0)).abs() < 1e-3, "{across}");
+    assert_eq!(found(seamless, Mode::REPEAT, edge), across);
+    assert!(found(seams, Mode::CLAMP_TO_EDGE, edge).abs() < 1e-3);
+    let repeated = found(seams, Mode::REPEAT, edge);
+    assert!((repeated - 0.5).abs() < 1e-3, "both columns: {repeated}");
+    let bordered = found(seams, Mode::CLAMP_TO_BORDER, edge);
+    assert!((bordered - 0.5).abs() < 1e-3, "half the border: {bordered}");
+    // In the middle of a face there is no difference.
+    let middle = "textureLod(image, vec3(0.0, 0.0, -1.0), 0.0)";
+    assert_eq!(found(seams, Mode::REPEAT, middle), 50.5);
+    assert_eq!(found(seamless, Mode::REPEAT, middle), 50.5);
+}

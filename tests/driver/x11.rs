@@ -6,7 +6,8 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use ash::vk;
-use gaurast_runner::Need;
+use gaurast_runner::{Need, is_long};
+use gaurast_tests::long_run::memory;
 use x11rb::connection::Connection;
 use x11rb::protocol::xproto::{
     ConfigureWindowAux, ConnectionExt, CreateWindowAux, ImageFormat, WindowClass,
@@ -247,7 +248,55 @@ fn a_window_changes_its_size() {
     assert_shown(&server, window.id, [0, 0, 255]);
 }
 
-/// Presents until the surface is lost, which must happen soon.
+/// A window that is resized all the time, for ten minutes if a test may be long: each size has a swapchain that takes the place
+/// of the last, and frames are presented in it. The process holds as much memory at the end as when all sizes have been there.
+#[gaurast_runner::test(alone, needs = [XVFB])]
+fn resizing_does_not_grow() {
+    const SIZES: u32 = 40;
+    const SAMPLE: u32 = 400;
+    const SLACK: u64 = 8 << 20;
+    let server = Server::start(&[]);
+    let window = Window::open(&server);
+    let presenter = window.presenter();
+    let options = SwapchainOptions {
+        mode: vk::PresentModeKHR::MAILBOX,
+        ..SwapchainOptions::default()
+    };
+    let mut swapchain = presenter.swapchain(&options).expect("a swapchain");
+    let (begin, mut resized, mut early) = (Instant::now(), 0, None);
+    let goes_on = |resized: u32| match is_long() {
+        true => begin.elapsed() < Duration::from_secs(600),
+        false => resized < SAMPLE,
+    };
+    while goes_on(resized) {
+        let size = [48 + 7 * (resized % SIZES), 200 - 4 * (resized % SIZES)];
+        window.resize(size);
+        // The old swapchain no longer suits the window.
+        assert_eq!(swapchain.frame([1.0; 4]).1, Ok(true), "{resized}");
+        let options = SwapchainOptions {
+            size,
+            old: swapchain.raw,
+            ..options
+        };
+        let new = presenter.swapchain(&options).expect("a swapchain");
+        drop(std::mem::replace(&mut swapchain, new));
+        assert_eq!(swapchain.frame([0.5; 4]).1, Ok(false), "{resized}");
+        resized += 1;
+        if resized == 2 * SIZES {
+            early = memory("VmRSS:");
+        }
+    }
+    let (Some(early), Some(late)) = (early, memory("VmRSS:")) else {
+        return;
+    };
+    println!("{resized} sizes: {early} bytes of memory, then {late}");
+    assert!(
+        late <= early + SLACK,
+        "memory grew from {early} to {late} bytes"
+    );
+}
+
+/// Presents until the surface is lost, which it must be soon.
 fn assert_lost(swapchain: &super::window::Swapchain<'_>) {
     let end = Instant::now() + Duration::from_secs(20);
     while swapchain.frame([0.5; 4]).1 != Err(vk::Result::ERROR_SURFACE_LOST_KHR) {

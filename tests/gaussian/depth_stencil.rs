@@ -3,6 +3,7 @@
 //! Triangles are drawn first. Their depths and stencils are read back and given to the oracle, and the oracle's picture
 //! of the Gaussians is blended over the colours.
 
+use ash::ext::{depth_clip_control, extended_dynamic_state3};
 use ash::vk;
 use gaurast::vk::{GaussianCameraGAURAST, GaussianOrderGAURAST};
 use gaurast_testkit::{
@@ -117,7 +118,9 @@ struct Case {
     name: String,
     target: TargetOptions,
     reverse: bool,
-    /// The viewport's depths for 0 and 1.
+    /// Whether the state is set by a command, not by the pipeline, where depths before the viewport are from -1 to 1.
+    sets_depths: bool,
+    /// The viewport's depths of 0 and 1.
     range: [f32; 2],
     options: GaussianOptions<'static>,
 }
@@ -128,6 +131,7 @@ impl Case {
             name,
             target: target(depth, samples),
             reverse: false,
+            sets_depths: false,
             range: [0.0, 1.0],
             options: GaussianOptions {
                 blend: vec![over()],
@@ -136,10 +140,22 @@ impl Case {
         }
     }
 
+    /// The camera, whose depths before the viewport are from 0 or -1 to 1.
+    fn camera(&self) -> GaussianCameraGAURAST<'static> {
+        let [c0, c1] = coefficients(self.reverse);
+        let camera = camera(self.reverse);
+        if self.options.negative_one_to_one {
+            camera.depth_coefficients([2.0 * c0 - 1.0, 2.0 * c1])
+        } else {
+            camera
+        }
+    }
+
     fn tests(&self) -> OracleTests {
         let state = &self.options.depth_stencil;
         OracleTests {
-            depth_coefficients: coefficients(self.reverse),
+            depth_coefficients: self.camera().depth_coefficients,
+            negative_one_to_one: self.options.negative_one_to_one,
             depth_range: self.range,
             format: depth_format(&self.target),
             depth: (state.depth_test_enable != vk::FALSE).then_some((
@@ -183,6 +199,7 @@ impl Case {
                 stored_degree: scene.degree,
                 drawn_degree: scene.degree,
                 formats: target.attachment_formats(),
+                negative_one_to_one: self.options.negative_one_to_one != self.sets_depths,
                 ..self.options.clone()
             };
             let pipeline = GaussianPipeline::new(gpu, &options);
@@ -205,7 +222,13 @@ impl Case {
             if let Some((pipeline, scene)) = &gaussians {
                 let size = SIZE.map(|side| side as f32);
                 commands.viewport([0.0, 0.0, size[0], size[1]], self.range);
-                scene.draw(commands, pipeline, &camera(self.reverse));
+                if self.sets_depths {
+                    let states = extended_dynamic_state3::Device::new(gpu.instance(), gpu.device());
+                    let set = self.options.negative_one_to_one;
+                    // SAFETY: the command buffer records, and its device has the extension.
+                    unsafe { states.cmd_set_depth_clip_negative_one_to_one(commands.raw, set) };
+                }
+                scene.draw(commands, pipeline, &self.camera());
             }
         })
     }
@@ -214,7 +237,7 @@ impl Case {
     fn judge(&self, gpu: &Gpu, scene: &SceneBuffers) -> usize {
         let before = held(&self.target, &self.draw(gpu, None));
         let after = held(&self.target, &self.draw(gpu, Some(scene)));
-        let oracle = OracleCamera::new(&camera(self.reverse), SIZE).expect("a pinhole");
+        let oracle = OracleCamera::new(&self.camera(), SIZE).expect("a pinhole");
         let state = (&self.options.state).into();
         let mut fragments = 0;
         for (sample, (before, after)) in before.iter().zip(&after).enumerate() {
@@ -356,6 +379,39 @@ fn depth_ranges_bounds_and_orders_apply() {
         case.options.depth_stencil = less;
         case.options.state = case.options.state.order(order);
         case.judge(&gpu, &scene);
+    }
+}
+
+/// Depths before the viewport are from -1 where the pipeline or a command says so.
+#[gaurast_runner::test(needs = [GLSLANG])]
+fn depths_may_begin_at_minus_one() {
+    let mut states = vk::PhysicalDeviceExtendedDynamicState3FeaturesEXT::default()
+        .extended_dynamic_state3_depth_clip_negative_one_to_one(true);
+    let mut control =
+        vk::PhysicalDeviceDepthClipControlFeaturesEXT::default().depth_clip_control(true);
+    control.p_next = (&raw mut states).cast();
+    let extensions = [depth_clip_control::NAME, extended_dynamic_state3::NAME];
+    let gpu = Gpu::extended(&extensions, &mut control).expect("a device");
+    let scene = layered_cloud(5, 1500);
+    for (format, reverse, range, sets_depths) in [
+        (vk::Format::D32_SFLOAT, false, [0.0, 1.0], false),
+        (vk::Format::D32_SFLOAT, true, [0.25, 0.875], true),
+        (vk::Format::D16_UNORM, false, [1.0, 0.5], true),
+    ] {
+        let mut case = Case::new(format!("from -1, {format:?}"), format, 1);
+        case.reverse = reverse;
+        case.range = range;
+        case.sets_depths = sets_depths;
+        case.options.negative_one_to_one = true;
+        case.options.depth_stencil = depth_test(match reverse {
+            false => vk::CompareOp::LESS,
+            true => vk::CompareOp::GREATER,
+        });
+        if sets_depths {
+            let state = vk::DynamicState::DEPTH_CLIP_NEGATIVE_ONE_TO_ONE_EXT;
+            case.options.dynamic.push(state);
+        }
+        assert!(case.judge(&gpu, &scene) > 0, "{}", case.name);
     }
 }
 

@@ -149,6 +149,7 @@ impl Hybrid {
 
     fn judge_sample(&self, name: &str, head: &Held, pane: &Held, after: &Held) {
         let tests = OracleTests {
+            negative_one_to_one: false,
             depth_coefficients: self.camera.depth_coefficients,
             depth_range: [0.0, 1.0],
             format: depth_format(&self.target),

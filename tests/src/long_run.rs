@@ -143,8 +143,8 @@ pub fn run(frames: usize, mut progress: impl FnMut(usize)) -> Report {
     Report { frames, memory }
 }
 
-/// Bytes of memory that the process uses (`VmRSS:`) or has used at most (`VmHWM:`), as Linux reports.
-fn memory(what: &str) -> Option<u64> {
+/// Bytes of memory that the process holds (`VmRSS:`) or has held at most (`VmHWM:`), as Linux tells.
+pub fn memory(what: &str) -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix(what))?;
     let kibibytes: u64 = line.trim().strip_suffix(" kB")?.parse().ok()?;

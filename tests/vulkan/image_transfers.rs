@@ -117,7 +117,9 @@ fn memory_holds_every_sample() {
     assert!(size(X4) >= 4 * size(vk::SampleCountFlags::TYPE_1));
     let refused = [
         create_info(8).samples(vk::SampleCountFlags::TYPE_2),
-        create_info(8).usage(vk::ImageUsageFlags::STORAGE),
+        create_info(8)
+            .flags(vk::ImageCreateFlags::CUBE_COMPATIBLE)
+            .array_layers(6),
         create_info(8).tiling(vk::ImageTiling::LINEAR),
     ];
     for info in refused {

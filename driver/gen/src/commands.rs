@@ -92,6 +92,7 @@ pub(crate) fn write(
             "#![allow(non_snake_case, reason = \"Vulkan's names\")]
             #![allow(clippy::too_many_arguments, reason = \"Vulkan's signatures\")]
             #![allow(clippy::semicolon_if_nothing_returned, reason = \"functions return what their guards do\")]
+            #![allow(clippy::redundant_closure, reason = \"all commands are recorded in closures\")]
 
             use super::lookup::Availability::{{Core, DeviceExtension, InstanceExtension}};
             use super::lookup::{{Command, Commands, Scope, rows}};

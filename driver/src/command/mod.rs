@@ -8,6 +8,7 @@
 pub(crate) mod bind;
 pub(crate) mod buffer;
 pub(crate) mod camera;
+pub(crate) mod conditional;
 pub(crate) mod draw;
 pub(crate) mod dynamic_state;
 pub(crate) mod gaussian_harmonics;
@@ -126,6 +127,15 @@ pub(crate) enum Command {
     },
     /// `vkCmdDispatchIndirect`: the number of workgroups is read when it executes.
     DispatchIndirect(BufferRange),
+    /// `vkCmdBeginConditionalRenderingEXT`: the word is read when it executes.
+    BeginConditional {
+        /// The four bytes of the word.
+        predicate: BufferRange,
+        /// True if what follows is executed where the word is zero, not where it isn't.
+        is_inverted: bool,
+    },
+    /// `vkCmdEndConditionalRenderingEXT`.
+    EndConditional,
     /// `vkCmdSetEvent` (true) and `vkCmdResetEvent` (false).
     SetEvent(Arc<Event>, bool),
     /// `vkCmdWaitEvents`.

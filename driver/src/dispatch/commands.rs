@@ -9,6 +9,10 @@
     clippy::semicolon_if_nothing_returned,
     reason = "functions return what their guards do"
 )]
+#![allow(
+    clippy::redundant_closure,
+    reason = "all commands are recorded in closures"
+)]
 
 use super::lookup::Availability::{Core, DeviceExtension, InstanceExtension};
 use super::lookup::{Command, Commands, Scope, rows};
@@ -261,6 +265,10 @@ static ROWS: &[Command] = rows! {
     Device, DeviceExtension(&[c"VK_EXT_color_write_enable"]) => {
         vkCmdSetColorWriteEnableEXT: vk::PFN_vkCmdSetColorWriteEnableEXT = vkCmdSetColorWriteEnableEXT;
     }
+    Device, DeviceExtension(&[c"VK_EXT_conditional_rendering"]) => {
+        vkCmdBeginConditionalRenderingEXT: vk::PFN_vkCmdBeginConditionalRenderingEXT = vkCmdBeginConditionalRenderingEXT;
+        vkCmdEndConditionalRenderingEXT: vk::PFN_vkCmdEndConditionalRenderingEXT = vkCmdEndConditionalRenderingEXT;
+    }
     Device, InstanceExtension(&[c"VK_EXT_debug_utils"]) => {
         vkSetDebugUtilsObjectNameEXT: vk::PFN_vkSetDebugUtilsObjectNameEXT = vkSetDebugUtilsObjectNameEXT;
         vkSetDebugUtilsObjectTagEXT: vk::PFN_vkSetDebugUtilsObjectTagEXT = vkSetDebugUtilsObjectTagEXT;
@@ -313,6 +321,7 @@ static ROWS: &[Command] = rows! {
         vkCmdSetProvokingVertexModeEXT: vk::PFN_vkCmdSetProvokingVertexModeEXT = vkCmdSetProvokingVertexModeEXT;
         vkCmdSetLineRasterizationModeEXT: vk::PFN_vkCmdSetLineRasterizationModeEXT = vkCmdSetLineRasterizationModeEXT;
         vkCmdSetLineStippleEnableEXT: vk::PFN_vkCmdSetLineStippleEnableEXT = vkCmdSetLineStippleEnableEXT;
+        vkCmdSetDepthClipNegativeOneToOneEXT: vk::PFN_vkCmdSetDepthClipNegativeOneToOneEXT = vkCmdSetDepthClipNegativeOneToOneEXT;
     }
     Instance, InstanceExtension(&[c"VK_EXT_headless_surface"]) => {
         vkCreateHeadlessSurfaceEXT: vk::PFN_vkCreateHeadlessSurfaceEXT = vkCreateHeadlessSurfaceEXT;
@@ -4458,6 +4467,40 @@ unsafe extern "system" fn vkCmdSetColorWriteEnableEXT(
     })
 }
 
+unsafe extern "system" fn vkCmdBeginConditionalRenderingEXT(
+    command_buffer: vk::CommandBuffer,
+    p_conditional_rendering_begin: *const vk::ConditionalRenderingBeginInfoEXT<'_>,
+) {
+    guard(command_buffer, "vkCmdBeginConditionalRenderingEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(
+                command_buffer,
+                "vkCmdBeginConditionalRenderingEXT",
+                |recorder| {
+                    crate::command::conditional::cmd_begin_conditional_rendering(
+                        recorder,
+                        valid::input(p_conditional_rendering_begin)?,
+                    )
+                },
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdEndConditionalRenderingEXT(command_buffer: vk::CommandBuffer) {
+    guard(command_buffer, "vkCmdEndConditionalRenderingEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(
+                command_buffer,
+                "vkCmdEndConditionalRenderingEXT",
+                |recorder| crate::command::conditional::cmd_end_conditional_rendering(recorder),
+            )
+        }
+    })
+}
+
 unsafe extern "system" fn vkSetDebugUtilsObjectNameEXT(
     device: vk::Device,
     _: *const vk::DebugUtilsObjectNameInfoEXT<'_>,
@@ -4882,6 +4925,32 @@ unsafe extern "system" fn vkCmdSetLineStippleEnableEXT(
             })
         }
     })
+}
+
+unsafe extern "system" fn vkCmdSetDepthClipNegativeOneToOneEXT(
+    command_buffer: vk::CommandBuffer,
+    negative_one_to_one: vk::Bool32,
+) {
+    guard(
+        command_buffer,
+        "vkCmdSetDepthClipNegativeOneToOneEXT",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                record(
+                    command_buffer,
+                    "vkCmdSetDepthClipNegativeOneToOneEXT",
+                    |recorder| {
+                        let enable = negative_one_to_one != vk::FALSE;
+                        crate::command::dynamic_state::set(
+                            recorder,
+                            DynamicState::DepthClipNegativeOneToOne { enable },
+                        )
+                    },
+                )
+            }
+        },
+    )
 }
 
 unsafe extern "system" fn vkCreateHeadlessSurfaceEXT(

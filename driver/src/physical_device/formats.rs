@@ -102,9 +102,10 @@ fn is_stored(format: Format) -> bool {
         && !format.has(Channel::X)
 }
 
-/// Reports whether programs can update texels atomically: integers of one word.
+/// Tells if programs update texels atomically: integers and floats of one word.
 fn is_atomic(format: Format) -> bool {
-    format.is_integer() && format.texel_size() == 4 && format.components().len() == 1
+    let is_one_word = format.texel_size() == 4 && format.components().len() == 1;
+    is_one_word && (format.is_integer() || format.numeric() == Numeric::Sfloat)
 }
 
 /// Reports whether a colour format can be rendered to. Formats of three equal components can't, as on other hardware;
@@ -178,7 +179,8 @@ const IMAGE_FLAGS: vk::ImageCreateFlags = vk::ImageCreateFlags::from_raw(
         | vk::ImageCreateFlags::EXTENDED_USAGE.as_raw()
         | vk::ImageCreateFlags::ALIAS.as_raw()
         | vk::ImageCreateFlags::CUBE_COMPATIBLE.as_raw()
-        | vk::ImageCreateFlags::TYPE_2D_ARRAY_COMPATIBLE.as_raw(),
+        | vk::ImageCreateFlags::TYPE_2D_ARRAY_COMPATIBLE.as_raw()
+        | vk::ImageCreateFlags::TYPE_2D_VIEW_COMPATIBLE_EXT.as_raw(),
 );
 
 /// The features that usages require; other usages are not supported.
@@ -308,8 +310,7 @@ pub(crate) fn image_properties(query: ImageQuery) -> Result<vk::ImageFormatPrope
     let has_samples = is_attachment
         && !is_linear
         && ty == vk::ImageType::TYPE_2D
-        && !flags.contains(vk::ImageCreateFlags::CUBE_COMPATIBLE)
-        && !usage.contains(vk::ImageUsageFlags::STORAGE);
+        && !flags.contains(vk::ImageCreateFlags::CUBE_COMPATIBLE);
     if is_linear && ty != vk::ImageType::TYPE_2D {
         return refuse("linear images have two dimensions".to_owned());
     }

@@ -185,6 +185,8 @@ dynamic_states! {
         set |state| state.draw.depth_clamp = enable, needed Fixed::rasterizes, gaussians Refused;
     DEPTH_CLIP_ENABLE_EXT => DepthClipEnable(enable: bool),
         set |state| state.draw.depth_clip = Some(enable), needed Fixed::rasterizes, gaussians Refused;
+    DEPTH_CLIP_NEGATIVE_ONE_TO_ONE_EXT => DepthClipNegativeOneToOne(enable: bool),
+        set |state| state.draw.negative_one_to_one = enable, needed Fixed::rasterizes, gaussians Taken;
     POLYGON_MODE_EXT => PolygonMode(mode: PolygonMode),
         set |state| state.draw.polygon_mode = mode, needed Fixed::rasterizes, gaussians Refused;
     PROVOKING_VERTEX_MODE_EXT => ProvokingVertexMode(mode: vk::ProvokingVertexModeEXT),
@@ -336,12 +338,12 @@ mod tests {
         assert!(all().all(is_supported));
         assert!(!is_supported(S::RASTERIZATION_SAMPLES_EXT));
         let taken = all().filter(|&state| is_taken_by_gaussians(state));
-        assert_eq!(taken.count(), 20);
+        assert_eq!(taken.count(), 21);
         let refused = all().filter(|&state| !may_gaussians_have(state));
         let refused: Vec<_> = refused.collect();
         let expected = [S::PRIMITIVE_RESTART_ENABLE, S::RASTERIZER_DISCARD_ENABLE];
         assert_eq!(refused[..2], expected);
-        // All states of VK_EXT_extended_dynamic_state3 and its additions.
+        // VK_EXT_extended_dynamic_state3 and what comes with it, but for the depths of clip space.
         assert_eq!(refused.len(), 19);
     }
 }

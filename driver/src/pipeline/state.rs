@@ -91,6 +91,8 @@ pub(crate) struct PreRasterizationState<'a> {
     pub(crate) viewport_count: u32,
     /// Viewports, unless dynamic.
     pub(crate) viewports: &'a [vk::Viewport],
+    /// True if clip space's depths are from -w, not from 0, to w.
+    pub(crate) negative_one_to_one: bool,
     /// The number of scissors.
     pub(crate) scissor_count: u32,
     /// Scissors, unless dynamic.
@@ -347,7 +349,7 @@ unsafe fn read_fragments<'a>(
 /// Reads viewports and scissors. The pointers may be invalid if these are dynamic.
 ///
 /// # Safety
-/// The state is valid.
+/// The state and its chain are valid.
 unsafe fn read_viewports<'a>(
     state: &'a vk::PipelineViewportStateCreateInfo<'a>,
     gathered: &mut GraphicsState<'a>,
@@ -355,6 +357,12 @@ unsafe fn read_viewports<'a>(
     use vk::DynamicState as S;
     gathered.pre_rasterization.viewport_count = state.viewport_count;
     gathered.pre_rasterization.scissor_count = state.scissor_count;
+    // SAFETY: the caller's promise.
+    let control = unsafe {
+        valid::find_in_chain::<vk::PipelineViewportDepthClipControlCreateInfoEXT<'_>>(state.p_next)
+    };
+    gathered.pre_rasterization.negative_one_to_one =
+        control.is_some_and(|control| control.negative_one_to_one != vk::FALSE);
     let is_dynamic = |states: [S; 2]| states.iter().any(|state| gathered.is_dynamic(*state));
     let dynamic_viewports = is_dynamic([S::VIEWPORT, S::VIEWPORT_WITH_COUNT]);
     let dynamic_scissors = is_dynamic([S::SCISSOR, S::SCISSOR_WITH_COUNT]);
@@ -749,6 +757,7 @@ impl FixedFunctionState {
             scissors: Vec::new(),
             depth_clamp: raster.depth_clamp_enable != vk::FALSE,
             depth_clip: info.pre_rasterization.depth_clip,
+            negative_one_to_one: info.pre_rasterization.negative_one_to_one,
             rasterizer_discard: raster.rasterizer_discard_enable != vk::FALSE,
             polygon_mode,
             cull_front: false,
@@ -1046,6 +1055,7 @@ impl FixedFunctionState {
         GaussianState {
             depth_stencil: converted.depth_stencil,
             blend_constants: converted.blend_constants,
+            negative_one_to_one: converted.negative_one_to_one,
             ..self.gaussian.as_deref().cloned().unwrap_or_default()
         }
     }

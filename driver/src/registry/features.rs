@@ -278,10 +278,16 @@ pub(crate) struct Features {
     pub(crate) border_color_swizzle_from_image: bool,
     /// `colorWriteEnable`.
     pub(crate) color_write_enable: bool,
+    /// `conditionalRendering`.
+    pub(crate) conditional_rendering: bool,
+    /// `inheritedConditionalRendering`.
+    pub(crate) inherited_conditional_rendering: bool,
     /// `customBorderColors`.
     pub(crate) custom_border_colors: bool,
     /// `customBorderColorWithoutFormat`.
     pub(crate) custom_border_color_without_format: bool,
+    /// `depthClipControl`.
+    pub(crate) depth_clip_control: bool,
     /// `depthClipEnable`.
     pub(crate) depth_clip_enable: bool,
     /// `extendedDynamicState`.
@@ -354,6 +360,10 @@ pub(crate) struct Features {
     pub(crate) extended_dynamic_state3_representative_fragment_test_enable: bool,
     /// `extendedDynamicState3ShadingRateImageEnable`.
     pub(crate) extended_dynamic_state3_shading_rate_image_enable: bool,
+    /// `image2DViewOf3D`.
+    pub(crate) image2_d_view_of3_d: bool,
+    /// `sampler2DViewOf3D`.
+    pub(crate) sampler2_d_view_of3_d: bool,
     /// `indexTypeUint8`.
     pub(crate) index_type_uint8: bool,
     /// `rectangularLines`.
@@ -370,6 +380,8 @@ pub(crate) struct Features {
     pub(crate) stippled_smooth_lines: bool,
     /// `multiDraw`.
     pub(crate) multi_draw: bool,
+    /// `nonSeamlessCubeMap`.
+    pub(crate) non_seamless_cube_map: bool,
     /// `primitiveTopologyListRestart`.
     pub(crate) primitive_topology_list_restart: bool,
     /// `primitiveTopologyPatchListRestart`.
@@ -384,6 +396,54 @@ pub(crate) struct Features {
     pub(crate) robust_image_access2: bool,
     /// `nullDescriptor`.
     pub(crate) null_descriptor: bool,
+    /// `shaderBufferFloat32Atomics`.
+    pub(crate) shader_buffer_float32_atomics: bool,
+    /// `shaderBufferFloat32AtomicAdd`.
+    pub(crate) shader_buffer_float32_atomic_add: bool,
+    /// `shaderBufferFloat64Atomics`.
+    pub(crate) shader_buffer_float64_atomics: bool,
+    /// `shaderBufferFloat64AtomicAdd`.
+    pub(crate) shader_buffer_float64_atomic_add: bool,
+    /// `shaderSharedFloat32Atomics`.
+    pub(crate) shader_shared_float32_atomics: bool,
+    /// `shaderSharedFloat32AtomicAdd`.
+    pub(crate) shader_shared_float32_atomic_add: bool,
+    /// `shaderSharedFloat64Atomics`.
+    pub(crate) shader_shared_float64_atomics: bool,
+    /// `shaderSharedFloat64AtomicAdd`.
+    pub(crate) shader_shared_float64_atomic_add: bool,
+    /// `shaderImageFloat32Atomics`.
+    pub(crate) shader_image_float32_atomics: bool,
+    /// `shaderImageFloat32AtomicAdd`.
+    pub(crate) shader_image_float32_atomic_add: bool,
+    /// `sparseImageFloat32Atomics`.
+    pub(crate) sparse_image_float32_atomics: bool,
+    /// `sparseImageFloat32AtomicAdd`.
+    pub(crate) sparse_image_float32_atomic_add: bool,
+    /// `shaderBufferFloat16Atomics`.
+    pub(crate) shader_buffer_float16_atomics: bool,
+    /// `shaderBufferFloat16AtomicAdd`.
+    pub(crate) shader_buffer_float16_atomic_add: bool,
+    /// `shaderBufferFloat16AtomicMinMax`.
+    pub(crate) shader_buffer_float16_atomic_min_max: bool,
+    /// `shaderBufferFloat32AtomicMinMax`.
+    pub(crate) shader_buffer_float32_atomic_min_max: bool,
+    /// `shaderBufferFloat64AtomicMinMax`.
+    pub(crate) shader_buffer_float64_atomic_min_max: bool,
+    /// `shaderSharedFloat16Atomics`.
+    pub(crate) shader_shared_float16_atomics: bool,
+    /// `shaderSharedFloat16AtomicAdd`.
+    pub(crate) shader_shared_float16_atomic_add: bool,
+    /// `shaderSharedFloat16AtomicMinMax`.
+    pub(crate) shader_shared_float16_atomic_min_max: bool,
+    /// `shaderSharedFloat32AtomicMinMax`.
+    pub(crate) shader_shared_float32_atomic_min_max: bool,
+    /// `shaderSharedFloat64AtomicMinMax`.
+    pub(crate) shader_shared_float64_atomic_min_max: bool,
+    /// `shaderImageFloat32AtomicMinMax`.
+    pub(crate) shader_image_float32_atomic_min_max: bool,
+    /// `sparseImageFloat32AtomicMinMax`.
+    pub(crate) sparse_image_float32_atomic_min_max: bool,
     /// `texelBufferAlignment`.
     pub(crate) texel_buffer_alignment: bool,
     /// `vertexAttributeInstanceRateDivisor`.
@@ -479,6 +539,7 @@ pub(crate) const SUPPORTED: Features = Features {
     fragment_stores_and_atomics: true,
     shader_image_gather_extended: true,
     shader_storage_image_extended_formats: true,
+    shader_storage_image_multisample: true,
     shader_storage_image_read_without_format: true,
     shader_storage_image_write_without_format: true,
     shader_uniform_buffer_array_dynamic_indexing: true,
@@ -561,8 +622,11 @@ pub(crate) const SUPPORTED: Features = Features {
     border_color_swizzle: true,
     border_color_swizzle_from_image: true,
     color_write_enable: true,
+    conditional_rendering: true,
+    inherited_conditional_rendering: true,
     custom_border_colors: true,
     custom_border_color_without_format: true,
+    depth_clip_control: true,
     depth_clip_enable: true,
     extended_dynamic_state: true,
     extended_dynamic_state2: true,
@@ -580,14 +644,27 @@ pub(crate) const SUPPORTED: Features = Features {
     extended_dynamic_state3_provoking_vertex_mode: true,
     extended_dynamic_state3_line_rasterization_mode: true,
     extended_dynamic_state3_line_stipple_enable: true,
+    extended_dynamic_state3_depth_clip_negative_one_to_one: true,
+    image2_d_view_of3_d: true,
+    sampler2_d_view_of3_d: true,
     index_type_uint8: true,
     rectangular_lines: true,
     multi_draw: true,
+    non_seamless_cube_map: true,
     primitive_topology_list_restart: true,
     provoking_vertex_last: true,
     robust_buffer_access2: true,
     robust_image_access2: true,
     null_descriptor: true,
+    shader_buffer_float32_atomics: true,
+    shader_buffer_float32_atomic_add: true,
+    shader_shared_float32_atomics: true,
+    shader_shared_float32_atomic_add: true,
+    shader_image_float32_atomics: true,
+    shader_image_float32_atomic_add: true,
+    shader_buffer_float32_atomic_min_max: true,
+    shader_shared_float32_atomic_min_max: true,
+    shader_image_float32_atomic_min_max: true,
     texel_buffer_alignment: true,
     vertex_attribute_instance_rate_divisor: true,
     vertex_attribute_instance_rate_zero_divisor: true,
@@ -760,8 +837,11 @@ impl Features {
         border_color_swizzle: false,
         border_color_swizzle_from_image: false,
         color_write_enable: false,
+        conditional_rendering: false,
+        inherited_conditional_rendering: false,
         custom_border_colors: false,
         custom_border_color_without_format: false,
+        depth_clip_control: false,
         depth_clip_enable: false,
         extended_dynamic_state: false,
         extended_dynamic_state2: false,
@@ -798,6 +878,8 @@ impl Features {
         extended_dynamic_state3_coverage_reduction_mode: false,
         extended_dynamic_state3_representative_fragment_test_enable: false,
         extended_dynamic_state3_shading_rate_image_enable: false,
+        image2_d_view_of3_d: false,
+        sampler2_d_view_of3_d: false,
         index_type_uint8: false,
         rectangular_lines: false,
         bresenham_lines: false,
@@ -806,6 +888,7 @@ impl Features {
         stippled_bresenham_lines: false,
         stippled_smooth_lines: false,
         multi_draw: false,
+        non_seamless_cube_map: false,
         primitive_topology_list_restart: false,
         primitive_topology_patch_list_restart: false,
         provoking_vertex_last: false,
@@ -813,6 +896,30 @@ impl Features {
         robust_buffer_access2: false,
         robust_image_access2: false,
         null_descriptor: false,
+        shader_buffer_float32_atomics: false,
+        shader_buffer_float32_atomic_add: false,
+        shader_buffer_float64_atomics: false,
+        shader_buffer_float64_atomic_add: false,
+        shader_shared_float32_atomics: false,
+        shader_shared_float32_atomic_add: false,
+        shader_shared_float64_atomics: false,
+        shader_shared_float64_atomic_add: false,
+        shader_image_float32_atomics: false,
+        shader_image_float32_atomic_add: false,
+        sparse_image_float32_atomics: false,
+        sparse_image_float32_atomic_add: false,
+        shader_buffer_float16_atomics: false,
+        shader_buffer_float16_atomic_add: false,
+        shader_buffer_float16_atomic_min_max: false,
+        shader_buffer_float32_atomic_min_max: false,
+        shader_buffer_float64_atomic_min_max: false,
+        shader_shared_float16_atomics: false,
+        shader_shared_float16_atomic_add: false,
+        shader_shared_float16_atomic_min_max: false,
+        shader_shared_float32_atomic_min_max: false,
+        shader_shared_float64_atomic_min_max: false,
+        shader_image_float32_atomic_min_max: false,
+        sparse_image_float32_atomic_min_max: false,
         texel_buffer_alignment: false,
         vertex_attribute_instance_rate_divisor: false,
         vertex_attribute_instance_rate_zero_divisor: false,
@@ -849,7 +956,7 @@ impl Features {
     };
 
     /// The features by their names in Rust.
-    pub(crate) fn list(&self) -> [(&'static str, bool); 220] {
+    pub(crate) fn list(&self) -> [(&'static str, bool); 250] {
         [
             ("robust_buffer_access", self.robust_buffer_access),
             ("full_draw_index_uint32", self.full_draw_index_uint32),
@@ -1165,11 +1272,17 @@ impl Features {
                 self.border_color_swizzle_from_image,
             ),
             ("color_write_enable", self.color_write_enable),
+            ("conditional_rendering", self.conditional_rendering),
+            (
+                "inherited_conditional_rendering",
+                self.inherited_conditional_rendering,
+            ),
             ("custom_border_colors", self.custom_border_colors),
             (
                 "custom_border_color_without_format",
                 self.custom_border_color_without_format,
             ),
+            ("depth_clip_control", self.depth_clip_control),
             ("depth_clip_enable", self.depth_clip_enable),
             ("extended_dynamic_state", self.extended_dynamic_state),
             ("extended_dynamic_state2", self.extended_dynamic_state2),
@@ -1305,6 +1418,8 @@ impl Features {
                 "extended_dynamic_state3_shading_rate_image_enable",
                 self.extended_dynamic_state3_shading_rate_image_enable,
             ),
+            ("image2_d_view_of3_d", self.image2_d_view_of3_d),
+            ("sampler2_d_view_of3_d", self.sampler2_d_view_of3_d),
             ("index_type_uint8", self.index_type_uint8),
             ("rectangular_lines", self.rectangular_lines),
             ("bresenham_lines", self.bresenham_lines),
@@ -1316,6 +1431,7 @@ impl Features {
             ("stippled_bresenham_lines", self.stippled_bresenham_lines),
             ("stippled_smooth_lines", self.stippled_smooth_lines),
             ("multi_draw", self.multi_draw),
+            ("non_seamless_cube_map", self.non_seamless_cube_map),
             (
                 "primitive_topology_list_restart",
                 self.primitive_topology_list_restart,
@@ -1332,6 +1448,102 @@ impl Features {
             ("robust_buffer_access2", self.robust_buffer_access2),
             ("robust_image_access2", self.robust_image_access2),
             ("null_descriptor", self.null_descriptor),
+            (
+                "shader_buffer_float32_atomics",
+                self.shader_buffer_float32_atomics,
+            ),
+            (
+                "shader_buffer_float32_atomic_add",
+                self.shader_buffer_float32_atomic_add,
+            ),
+            (
+                "shader_buffer_float64_atomics",
+                self.shader_buffer_float64_atomics,
+            ),
+            (
+                "shader_buffer_float64_atomic_add",
+                self.shader_buffer_float64_atomic_add,
+            ),
+            (
+                "shader_shared_float32_atomics",
+                self.shader_shared_float32_atomics,
+            ),
+            (
+                "shader_shared_float32_atomic_add",
+                self.shader_shared_float32_atomic_add,
+            ),
+            (
+                "shader_shared_float64_atomics",
+                self.shader_shared_float64_atomics,
+            ),
+            (
+                "shader_shared_float64_atomic_add",
+                self.shader_shared_float64_atomic_add,
+            ),
+            (
+                "shader_image_float32_atomics",
+                self.shader_image_float32_atomics,
+            ),
+            (
+                "shader_image_float32_atomic_add",
+                self.shader_image_float32_atomic_add,
+            ),
+            (
+                "sparse_image_float32_atomics",
+                self.sparse_image_float32_atomics,
+            ),
+            (
+                "sparse_image_float32_atomic_add",
+                self.sparse_image_float32_atomic_add,
+            ),
+            (
+                "shader_buffer_float16_atomics",
+                self.shader_buffer_float16_atomics,
+            ),
+            (
+                "shader_buffer_float16_atomic_add",
+                self.shader_buffer_float16_atomic_add,
+            ),
+            (
+                "shader_buffer_float16_atomic_min_max",
+                self.shader_buffer_float16_atomic_min_max,
+            ),
+            (
+                "shader_buffer_float32_atomic_min_max",
+                self.shader_buffer_float32_atomic_min_max,
+            ),
+            (
+                "shader_buffer_float64_atomic_min_max",
+                self.shader_buffer_float64_atomic_min_max,
+            ),
+            (
+                "shader_shared_float16_atomics",
+                self.shader_shared_float16_atomics,
+            ),
+            (
+                "shader_shared_float16_atomic_add",
+                self.shader_shared_float16_atomic_add,
+            ),
+            (
+                "shader_shared_float16_atomic_min_max",
+                self.shader_shared_float16_atomic_min_max,
+            ),
+            (
+                "shader_shared_float32_atomic_min_max",
+                self.shader_shared_float32_atomic_min_max,
+            ),
+            (
+                "shader_shared_float64_atomic_min_max",
+                self.shader_shared_float64_atomic_min_max,
+            ),
+            (
+                "shader_image_float32_atomic_min_max",
+                self.shader_image_float32_atomic_min_max,
+            ),
+            (
+                "sparse_image_float32_atomic_min_max",
+                self.sparse_image_float32_atomic_min_max,
+            ),
             ("texel_buffer_alignment", self.texel_buffer_alignment),
             (
                 "vertex_attribute_instance_rate_divisor",
@@ -1863,9 +2075,17 @@ impl Features {
         if let Some(out) = structure.cast::<vk::PhysicalDeviceColorWriteEnableFeaturesEXT<'_>>() {
             out.color_write_enable = self.color_write_enable.into();
         }
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceConditionalRenderingFeaturesEXT<'_>>()
+        {
+            out.conditional_rendering = self.conditional_rendering.into();
+            out.inherited_conditional_rendering = self.inherited_conditional_rendering.into();
+        }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceCustomBorderColorFeaturesEXT<'_>>() {
             out.custom_border_colors = self.custom_border_colors.into();
             out.custom_border_color_without_format = self.custom_border_color_without_format.into();
+        }
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceDepthClipControlFeaturesEXT<'_>>() {
+            out.depth_clip_control = self.depth_clip_control.into();
         }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceDepthClipEnableFeaturesEXT<'_>>() {
             out.depth_clip_enable = self.depth_clip_enable.into();
@@ -1958,6 +2178,10 @@ impl Features {
                 .extended_dynamic_state3_shading_rate_image_enable
                 .into();
         }
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceImage2DViewOf3DFeaturesEXT<'_>>() {
+            out.image2_d_view_of3_d = self.image2_d_view_of3_d.into();
+            out.sampler2_d_view_of3_d = self.sampler2_d_view_of3_d.into();
+        }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceIndexTypeUint8FeaturesKHR<'_>>() {
             out.index_type_uint8 = self.index_type_uint8.into();
         }
@@ -1971,6 +2195,9 @@ impl Features {
         }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceMultiDrawFeaturesEXT<'_>>() {
             out.multi_draw = self.multi_draw.into();
+        }
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceNonSeamlessCubeMapFeaturesEXT<'_>>() {
+            out.non_seamless_cube_map = self.non_seamless_cube_map.into();
         }
         if let Some(out) =
             structure.cast::<vk::PhysicalDevicePrimitiveTopologyListRestartFeaturesEXT<'_>>()
@@ -1988,6 +2215,42 @@ impl Features {
             out.robust_buffer_access2 = self.robust_buffer_access2.into();
             out.robust_image_access2 = self.robust_image_access2.into();
             out.null_descriptor = self.null_descriptor.into();
+        }
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceShaderAtomicFloatFeaturesEXT<'_>>() {
+            out.shader_buffer_float32_atomics = self.shader_buffer_float32_atomics.into();
+            out.shader_buffer_float32_atomic_add = self.shader_buffer_float32_atomic_add.into();
+            out.shader_buffer_float64_atomics = self.shader_buffer_float64_atomics.into();
+            out.shader_buffer_float64_atomic_add = self.shader_buffer_float64_atomic_add.into();
+            out.shader_shared_float32_atomics = self.shader_shared_float32_atomics.into();
+            out.shader_shared_float32_atomic_add = self.shader_shared_float32_atomic_add.into();
+            out.shader_shared_float64_atomics = self.shader_shared_float64_atomics.into();
+            out.shader_shared_float64_atomic_add = self.shader_shared_float64_atomic_add.into();
+            out.shader_image_float32_atomics = self.shader_image_float32_atomics.into();
+            out.shader_image_float32_atomic_add = self.shader_image_float32_atomic_add.into();
+            out.sparse_image_float32_atomics = self.sparse_image_float32_atomics.into();
+            out.sparse_image_float32_atomic_add = self.sparse_image_float32_atomic_add.into();
+        }
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceShaderAtomicFloat2FeaturesEXT<'_>>() {
+            out.shader_buffer_float16_atomics = self.shader_buffer_float16_atomics.into();
+            out.shader_buffer_float16_atomic_add = self.shader_buffer_float16_atomic_add.into();
+            out.shader_buffer_float16_atomic_min_max =
+                self.shader_buffer_float16_atomic_min_max.into();
+            out.shader_buffer_float32_atomic_min_max =
+                self.shader_buffer_float32_atomic_min_max.into();
+            out.shader_buffer_float64_atomic_min_max =
+                self.shader_buffer_float64_atomic_min_max.into();
+            out.shader_shared_float16_atomics = self.shader_shared_float16_atomics.into();
+            out.shader_shared_float16_atomic_add = self.shader_shared_float16_atomic_add.into();
+            out.shader_shared_float16_atomic_min_max =
+                self.shader_shared_float16_atomic_min_max.into();
+            out.shader_shared_float32_atomic_min_max =
+                self.shader_shared_float32_atomic_min_max.into();
+            out.shader_shared_float64_atomic_min_max =
+                self.shader_shared_float64_atomic_min_max.into();
+            out.shader_image_float32_atomic_min_max =
+                self.shader_image_float32_atomic_min_max.into();
+            out.sparse_image_float32_atomic_min_max =
+                self.sparse_image_float32_atomic_min_max.into();
         }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceTexelBufferAlignmentFeaturesEXT<'_>>()
         {
@@ -2417,11 +2680,23 @@ impl Features {
             self.color_write_enable |= requested.color_write_enable != vk::FALSE;
         }
         if let Some(requested) =
+            valid::cast::<vk::PhysicalDeviceConditionalRenderingFeaturesEXT<'_>>(structure)
+        {
+            self.conditional_rendering |= requested.conditional_rendering != vk::FALSE;
+            self.inherited_conditional_rendering |=
+                requested.inherited_conditional_rendering != vk::FALSE;
+        }
+        if let Some(requested) =
             valid::cast::<vk::PhysicalDeviceCustomBorderColorFeaturesEXT<'_>>(structure)
         {
             self.custom_border_colors |= requested.custom_border_colors != vk::FALSE;
             self.custom_border_color_without_format |=
                 requested.custom_border_color_without_format != vk::FALSE;
+        }
+        if let Some(requested) =
+            valid::cast::<vk::PhysicalDeviceDepthClipControlFeaturesEXT<'_>>(structure)
+        {
+            self.depth_clip_control |= requested.depth_clip_control != vk::FALSE;
         }
         if let Some(requested) =
             valid::cast::<vk::PhysicalDeviceDepthClipEnableFeaturesEXT<'_>>(structure)
@@ -2509,6 +2784,12 @@ impl Features {
                 requested.extended_dynamic_state3_shading_rate_image_enable != vk::FALSE;
         }
         if let Some(requested) =
+            valid::cast::<vk::PhysicalDeviceImage2DViewOf3DFeaturesEXT<'_>>(structure)
+        {
+            self.image2_d_view_of3_d |= requested.image2_d_view_of3_d != vk::FALSE;
+            self.sampler2_d_view_of3_d |= requested.sampler2_d_view_of3_d != vk::FALSE;
+        }
+        if let Some(requested) =
             valid::cast::<vk::PhysicalDeviceIndexTypeUint8FeaturesKHR<'_>>(structure)
         {
             self.index_type_uint8 |= requested.index_type_uint8 != vk::FALSE;
@@ -2527,6 +2808,11 @@ impl Features {
             valid::cast::<vk::PhysicalDeviceMultiDrawFeaturesEXT<'_>>(structure)
         {
             self.multi_draw |= requested.multi_draw != vk::FALSE;
+        }
+        if let Some(requested) =
+            valid::cast::<vk::PhysicalDeviceNonSeamlessCubeMapFeaturesEXT<'_>>(structure)
+        {
+            self.non_seamless_cube_map |= requested.non_seamless_cube_map != vk::FALSE;
         }
         if let Some(requested) =
             valid::cast::<vk::PhysicalDevicePrimitiveTopologyListRestartFeaturesEXT<'_>>(structure)
@@ -2549,6 +2835,62 @@ impl Features {
             self.robust_buffer_access2 |= requested.robust_buffer_access2 != vk::FALSE;
             self.robust_image_access2 |= requested.robust_image_access2 != vk::FALSE;
             self.null_descriptor |= requested.null_descriptor != vk::FALSE;
+        }
+        if let Some(requested) =
+            valid::cast::<vk::PhysicalDeviceShaderAtomicFloatFeaturesEXT<'_>>(structure)
+        {
+            self.shader_buffer_float32_atomics |=
+                requested.shader_buffer_float32_atomics != vk::FALSE;
+            self.shader_buffer_float32_atomic_add |=
+                requested.shader_buffer_float32_atomic_add != vk::FALSE;
+            self.shader_buffer_float64_atomics |=
+                requested.shader_buffer_float64_atomics != vk::FALSE;
+            self.shader_buffer_float64_atomic_add |=
+                requested.shader_buffer_float64_atomic_add != vk::FALSE;
+            self.shader_shared_float32_atomics |=
+                requested.shader_shared_float32_atomics != vk::FALSE;
+            self.shader_shared_float32_atomic_add |=
+                requested.shader_shared_float32_atomic_add != vk::FALSE;
+            self.shader_shared_float64_atomics |=
+                requested.shader_shared_float64_atomics != vk::FALSE;
+            self.shader_shared_float64_atomic_add |=
+                requested.shader_shared_float64_atomic_add != vk::FALSE;
+            self.shader_image_float32_atomics |=
+                requested.shader_image_float32_atomics != vk::FALSE;
+            self.shader_image_float32_atomic_add |=
+                requested.shader_image_float32_atomic_add != vk::FALSE;
+            self.sparse_image_float32_atomics |=
+                requested.sparse_image_float32_atomics != vk::FALSE;
+            self.sparse_image_float32_atomic_add |=
+                requested.sparse_image_float32_atomic_add != vk::FALSE;
+        }
+        if let Some(requested) =
+            valid::cast::<vk::PhysicalDeviceShaderAtomicFloat2FeaturesEXT<'_>>(structure)
+        {
+            self.shader_buffer_float16_atomics |=
+                requested.shader_buffer_float16_atomics != vk::FALSE;
+            self.shader_buffer_float16_atomic_add |=
+                requested.shader_buffer_float16_atomic_add != vk::FALSE;
+            self.shader_buffer_float16_atomic_min_max |=
+                requested.shader_buffer_float16_atomic_min_max != vk::FALSE;
+            self.shader_buffer_float32_atomic_min_max |=
+                requested.shader_buffer_float32_atomic_min_max != vk::FALSE;
+            self.shader_buffer_float64_atomic_min_max |=
+                requested.shader_buffer_float64_atomic_min_max != vk::FALSE;
+            self.shader_shared_float16_atomics |=
+                requested.shader_shared_float16_atomics != vk::FALSE;
+            self.shader_shared_float16_atomic_add |=
+                requested.shader_shared_float16_atomic_add != vk::FALSE;
+            self.shader_shared_float16_atomic_min_max |=
+                requested.shader_shared_float16_atomic_min_max != vk::FALSE;
+            self.shader_shared_float32_atomic_min_max |=
+                requested.shader_shared_float32_atomic_min_max != vk::FALSE;
+            self.shader_shared_float64_atomic_min_max |=
+                requested.shader_shared_float64_atomic_min_max != vk::FALSE;
+            self.shader_image_float32_atomic_min_max |=
+                requested.shader_image_float32_atomic_min_max != vk::FALSE;
+            self.sparse_image_float32_atomic_min_max |=
+                requested.sparse_image_float32_atomic_min_max != vk::FALSE;
         }
         if let Some(requested) =
             valid::cast::<vk::PhysicalDeviceTexelBufferAlignmentFeaturesEXT<'_>>(structure)
@@ -2629,8 +2971,14 @@ pub(crate) fn extension_of(structure: vk::StructureType) -> Option<&'static CStr
         vk::PhysicalDeviceColorWriteEnableFeaturesEXT::STRUCTURE_TYPE => {
             Some(c"VK_EXT_color_write_enable")
         }
+        vk::PhysicalDeviceConditionalRenderingFeaturesEXT::STRUCTURE_TYPE => {
+            Some(c"VK_EXT_conditional_rendering")
+        }
         vk::PhysicalDeviceCustomBorderColorFeaturesEXT::STRUCTURE_TYPE => {
             Some(c"VK_EXT_custom_border_color")
+        }
+        vk::PhysicalDeviceDepthClipControlFeaturesEXT::STRUCTURE_TYPE => {
+            Some(c"VK_EXT_depth_clip_control")
         }
         vk::PhysicalDeviceDepthClipEnableFeaturesEXT::STRUCTURE_TYPE => {
             Some(c"VK_EXT_depth_clip_enable")
@@ -2644,6 +2992,9 @@ pub(crate) fn extension_of(structure: vk::StructureType) -> Option<&'static CStr
         vk::PhysicalDeviceExtendedDynamicState3FeaturesEXT::STRUCTURE_TYPE => {
             Some(c"VK_EXT_extended_dynamic_state3")
         }
+        vk::PhysicalDeviceImage2DViewOf3DFeaturesEXT::STRUCTURE_TYPE => {
+            Some(c"VK_EXT_image_2d_view_of_3d")
+        }
         vk::PhysicalDeviceIndexTypeUint8FeaturesKHR::STRUCTURE_TYPE => {
             Some(c"VK_EXT_index_type_uint8")
         }
@@ -2651,6 +3002,9 @@ pub(crate) fn extension_of(structure: vk::StructureType) -> Option<&'static CStr
             Some(c"VK_EXT_line_rasterization")
         }
         vk::PhysicalDeviceMultiDrawFeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_multi_draw"),
+        vk::PhysicalDeviceNonSeamlessCubeMapFeaturesEXT::STRUCTURE_TYPE => {
+            Some(c"VK_EXT_non_seamless_cube_map")
+        }
         vk::PhysicalDevicePrimitiveTopologyListRestartFeaturesEXT::STRUCTURE_TYPE => {
             Some(c"VK_EXT_primitive_topology_list_restart")
         }
@@ -2658,6 +3012,12 @@ pub(crate) fn extension_of(structure: vk::StructureType) -> Option<&'static CStr
             Some(c"VK_EXT_provoking_vertex")
         }
         vk::PhysicalDeviceRobustness2FeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_robustness2"),
+        vk::PhysicalDeviceShaderAtomicFloatFeaturesEXT::STRUCTURE_TYPE => {
+            Some(c"VK_EXT_shader_atomic_float")
+        }
+        vk::PhysicalDeviceShaderAtomicFloat2FeaturesEXT::STRUCTURE_TYPE => {
+            Some(c"VK_EXT_shader_atomic_float2")
+        }
         vk::PhysicalDeviceTexelBufferAlignmentFeaturesEXT::STRUCTURE_TYPE => {
             Some(c"VK_EXT_texel_buffer_alignment")
         }

@@ -42,30 +42,58 @@ pub(crate) fn enables(capability: Capability) -> &'static [Enable] {
             Enable::Absent("shader_image_int64_atomics"),
         ],
         Capability::AtomicFloat16AddEXT => &[
-            Enable::Absent("shader_buffer_float16_atomic_add"),
-            Enable::Absent("shader_shared_float16_atomic_add"),
+            Enable::Feature("shader_buffer_float16_atomic_add", |f| {
+                f.shader_buffer_float16_atomic_add
+            }),
+            Enable::Feature("shader_shared_float16_atomic_add", |f| {
+                f.shader_shared_float16_atomic_add
+            }),
         ],
         Capability::AtomicFloat32AddEXT => &[
-            Enable::Absent("shader_buffer_float32_atomic_add"),
-            Enable::Absent("shader_shared_float32_atomic_add"),
-            Enable::Absent("shader_image_float32_atomic_add"),
+            Enable::Feature("shader_buffer_float32_atomic_add", |f| {
+                f.shader_buffer_float32_atomic_add
+            }),
+            Enable::Feature("shader_shared_float32_atomic_add", |f| {
+                f.shader_shared_float32_atomic_add
+            }),
+            Enable::Feature("shader_image_float32_atomic_add", |f| {
+                f.shader_image_float32_atomic_add
+            }),
         ],
         Capability::AtomicFloat64AddEXT => &[
-            Enable::Absent("shader_buffer_float64_atomic_add"),
-            Enable::Absent("shader_shared_float64_atomic_add"),
+            Enable::Feature("shader_buffer_float64_atomic_add", |f| {
+                f.shader_buffer_float64_atomic_add
+            }),
+            Enable::Feature("shader_shared_float64_atomic_add", |f| {
+                f.shader_shared_float64_atomic_add
+            }),
         ],
         Capability::AtomicFloat16MinMaxEXT => &[
-            Enable::Absent("shader_buffer_float16_atomic_min_max"),
-            Enable::Absent("shader_shared_float16_atomic_min_max"),
+            Enable::Feature("shader_buffer_float16_atomic_min_max", |f| {
+                f.shader_buffer_float16_atomic_min_max
+            }),
+            Enable::Feature("shader_shared_float16_atomic_min_max", |f| {
+                f.shader_shared_float16_atomic_min_max
+            }),
         ],
         Capability::AtomicFloat32MinMaxEXT => &[
-            Enable::Absent("shader_buffer_float32_atomic_min_max"),
-            Enable::Absent("shader_shared_float32_atomic_min_max"),
-            Enable::Absent("shader_image_float32_atomic_min_max"),
+            Enable::Feature("shader_buffer_float32_atomic_min_max", |f| {
+                f.shader_buffer_float32_atomic_min_max
+            }),
+            Enable::Feature("shader_shared_float32_atomic_min_max", |f| {
+                f.shader_shared_float32_atomic_min_max
+            }),
+            Enable::Feature("shader_image_float32_atomic_min_max", |f| {
+                f.shader_image_float32_atomic_min_max
+            }),
         ],
         Capability::AtomicFloat64MinMaxEXT => &[
-            Enable::Absent("shader_buffer_float64_atomic_min_max"),
-            Enable::Absent("shader_shared_float64_atomic_min_max"),
+            Enable::Feature("shader_buffer_float64_atomic_min_max", |f| {
+                f.shader_buffer_float64_atomic_min_max
+            }),
+            Enable::Feature("shader_shared_float64_atomic_min_max", |f| {
+                f.shader_shared_float64_atomic_min_max
+            }),
         ],
         Capability::AtomicFloat16VectorNV => &[Enable::Absent("shader_float16_vector_atomics")],
         Capability::Int64ImageEXT => &[Enable::Absent("shader_image_int64_atomics")],

@@ -312,6 +312,16 @@ pub(crate) unsafe fn bind_buffer_memory2(
     })
 }
 
+/// The bytes of a texel, or of a component of one of three.
+fn texel_alignment(format: Format) -> u64 {
+    let size = format.texel_size().max(1) as u64;
+    if size.is_multiple_of(3) {
+        size / 3
+    } else {
+        size
+    }
+}
+
 #[doc(alias = "vkCreateBufferView")]
 pub(crate) fn create_buffer_view(
     create_info: &vk::BufferViewCreateInfo<'_>,
@@ -325,11 +335,12 @@ pub(crate) fn create_buffer_view(
             info.format
         ))
     })?;
-    if !info.offset.is_multiple_of(MIN_BUFFER_OFFSET_ALIGNMENT) {
+    let alignment = MIN_BUFFER_OFFSET_ALIGNMENT.min(texel_alignment(format));
+    if !info.offset.is_multiple_of(alignment) {
         return Err(Error::usage(
-            "VUID-VkBufferViewCreateInfo-offset-02749",
+            "VUID-VkBufferViewCreateInfo-buffer-02751",
             format!(
-                "the offset {} is not a multiple of {MIN_BUFFER_OFFSET_ALIGNMENT}",
+                "the offset {} is not a multiple of {alignment}",
                 info.offset
             ),
         ));

@@ -108,8 +108,8 @@ pub(crate) struct ImageView {
 }
 
 impl ImageView {
-    /// A view of `range` of a bound image, read as `format`. In a view of a 3D image as an array of 2D ones, slices are
-    /// layers; it can only be rendered to.
+    /// A view of `range` of a bound image, read as `format`. A view of a 3D image as an array of 2D ones has its slices
+    /// for layers; it is rendered to, and programs read and write what is of one slice.
     ///
     /// # Errors
     /// [`Error::InvalidUsage`] if the image is not bound or does not have the range, or the formats are not compatible.

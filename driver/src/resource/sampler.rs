@@ -61,6 +61,9 @@ impl Sampler {
                     Some(color) => convert::custom_border_color(color),
                     None => convert::border_color(info.border_color)?,
                 },
+                has_seams: info
+                    .flags
+                    .contains(vk::SamplerCreateFlags::NON_SEAMLESS_CUBE_MAP_EXT),
                 unnormalized_coordinates: info.unnormalized_coordinates != vk::FALSE,
                 max_anisotropy: match is_anisotropic {
                     true => info.max_anisotropy.clamp(1.0, most),

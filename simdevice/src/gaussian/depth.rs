@@ -22,14 +22,21 @@ pub(crate) struct CenterDepth {
     /// True if the depth is linear in the depth variable, false if it is linear in its inverse.
     is_linear: bool,
     coefficients: [f64; 2],
-    /// The viewport's `minDepth` and `maxDepth`.
+    /// The factor and the summand that take depths before the viewport to 0 to 1.
+    to_unit: [f64; 2],
+    /// The viewport's depths of 0 and 1.
     range: [f64; 2],
     code: DepthEncoding,
 }
 
 impl CenterDepth {
-    /// The map of a camera and a viewport, for an attachment of `format`.
-    pub(crate) fn new(camera: &Camera, viewport: &Viewport, format: Format) -> Self {
+    /// Of a camera, a viewport and the depths before it, for an attachment of `format`.
+    pub(crate) fn new(
+        camera: &Camera,
+        viewport: &Viewport,
+        negative_one_to_one: bool,
+        format: Format,
+    ) -> Self {
         Self {
             #[cfg(feature = "mistakes")]
             is_linear: camera.model == CameraModel::Orthographic
@@ -37,13 +44,18 @@ impl CenterDepth {
             #[cfg(not(feature = "mistakes"))]
             is_linear: camera.model == CameraModel::Orthographic,
             coefficients: camera.depth_coefficients.map(f64::from),
+            to_unit: if negative_one_to_one {
+                [0.5, 0.5]
+            } else {
+                [1.0, 0.0]
+            },
             range: [viewport.min_depth, viewport.max_depth].map(f64::from),
             code: DepthEncoding::of(format),
         }
     }
 
-    /// The encoded depth of a centre whose depth variable is `z`: computed in binary64, clamped to 0 to 1, mapped to
-    /// the viewport's range and rounded once, to the nearest value of the format.
+    /// The depth of a centre whose depth variable is `z`: computed in binary64, taken to 0 to 1, clamped to that, mapped to
+    /// the viewport's range and rounded once, to the format's nearest.
     #[inline]
     pub(crate) fn code(&self, z: f32) -> u32 {
         let z = f64::from(z);
@@ -51,12 +63,13 @@ impl CenterDepth {
         self.encode(c0 + if self.is_linear { c1 * z } else { c1 / z })
     }
 
-    /// The encoded depth of a centre whose normalised device coordinate is `depth`: clamped, mapped and rounded as in
-    /// [`CenterDepth::code`].
+    /// The depth of a centre whose normalised device coordinate is `depth`, taken to 0 to 1, clamped, mapped and rounded so.
     #[inline]
     pub(crate) fn encode(&self, depth: f64) -> u32 {
         let [near, far] = self.range;
-        let depth = clamp(near + clamp(depth) * (far - near));
+        let [factor, summand] = self.to_unit;
+        let unit = clamp(depth * factor + summand);
+        let depth = clamp(near + unit * (far - near));
         match self.code {
             DepthEncoding::Float => (depth as f32).to_bits(),
             DepthEncoding::Unorm(bits) => {
@@ -122,7 +135,7 @@ mod tests {
             min_depth: range[0],
             max_depth: range[1],
         };
-        CenterDepth::new(&camera, &viewport, format)
+        CenterDepth::new(&camera, &viewport, false, format)
     }
 
     #[test]
@@ -144,6 +157,26 @@ mod tests {
         assert!((two - expected).abs() < 1e-6, "{two}");
         assert_eq!(of(Format::D16Unorm).code(2.0), 43690);
         assert_eq!(of(Format::X8D24UnormPack32).code(4.0), (1 << 24) - 1);
+    }
+
+    #[test]
+    fn depths_from_minus_one_are_taken_to_the_unit() {
+        let format = Format::D32Sfloat;
+        let unit = depth(CameraModel::Orthographic, [0.0, 1.0], [0.25, 0.75], format);
+        let both = CenterDepth {
+            to_unit: [0.5, 0.5],
+            ..unit
+        };
+        for (z, expected) in [
+            (-2.0, 0.25),
+            (-1.0, 0.25),
+            (0.0, 0.5),
+            (0.5, 0.625),
+            (3.0, 0.75),
+        ] {
+            assert_eq!(f32::from_bits(both.code(z)), expected, "{z}");
+        }
+        assert_eq!(f32::from_bits(unit.code(0.5)), 0.5);
     }
 
     #[test]

@@ -62,6 +62,12 @@ fn viewport_pixels(viewport: &Viewport) -> Rect {
     }
 }
 
+/// The depths of a set's centres, as an attachment of `format` holds them.
+fn center_depth(begin: &GaussianBegin, format: Format) -> CenterDepth {
+    let negative_one_to_one = begin.state.negative_one_to_one;
+    CenterDepth::new(&begin.camera, &begin.viewport, negative_one_to_one, format)
+}
+
 impl GaussianSet {
     /// Starts a set that may touch the pixels of `area` which lie in its scissor and its viewport. `depth` is the
     /// depth attachment's format, if there is one.
@@ -77,7 +83,7 @@ impl GaussianSet {
             bounds: visible,
             depth: depth
                 .filter(|_| begin.state.depth_stencil.depth.is_some())
-                .map(|format| CenterDepth::new(&begin.camera, &begin.viewport, format)),
+                .map(|format| center_depth(begin, format)),
             depth_format: depth.unwrap_or(Format::D32Sfloat),
             resolve: None,
             appends: Vec::new(),
@@ -115,12 +121,7 @@ impl GaussianSet {
     /// Lets a fragment program compute the colours of the set's fragments.
     pub fn shade_fragments(&mut self, shader: &GaussianFragmentStage) {
         if shader.program.reads_depth() {
-            let begin = &self.begin;
-            self.depth = Some(CenterDepth::new(
-                &begin.camera,
-                &begin.viewport,
-                self.depth_format,
-            ));
+            self.depth = Some(center_depth(&self.begin, self.depth_format));
         }
         self.resolve = Some(shader.clone());
     }

@@ -35,6 +35,8 @@ struct Shading {
     /// Half the viewport's extent, in framebuffer pixels; `middle` is its middle.
     half: [f64; 2],
     middle: [f64; 2],
+    /// The normalized device coordinate of the near plane, 0 or -1.
+    near: f32,
     order: GaussianOrder,
     /// True if the program writes the depth key.
     writes_key: bool,
@@ -217,6 +219,7 @@ impl Shading {
                 half[0] + f64::from(viewport.x),
                 half[1] + f64::from(viewport.y),
             ],
+            near: if state.negative_one_to_one { -1.0 } else { 0.0 },
             order: state.order,
             writes_key: shader.writes(gaussian::DEPTH_KEY),
             depth: set.depth,
@@ -257,7 +260,7 @@ impl Shading {
                 Some(Counter::SkippedNonFinite)
             } else if f64::from(opacity) < self.constants.alpha_floor {
                 Some(Counter::SkippedFaint)
-            } else if w <= 0.0 || z < 0.0 {
+            } else if w <= 0.0 || z < self.near * w {
                 Some(Counter::SkippedNear)
             } else if z > w {
                 Some(Counter::SkippedFar)

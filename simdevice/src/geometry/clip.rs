@@ -71,11 +71,16 @@ impl Clipper<'_> {
         frustum.chain(user)
     }
 
-    /// The distance of a vertex from a plane: positive inside, negative outside.
+    /// The normalized device coordinate of the near plane.
+    fn near(&self) -> f64 {
+        self.transform.near.into()
+    }
+
+    /// How far a vertex is inside a plane; negative outside.
     fn distance(&self, plane: Plane, vertex: &ClipVertex) -> f64 {
         let [_, _, z, w] = vertex.position;
         match plane {
-            Plane::Near => z,
+            Plane::Near => z - self.near() * w,
             Plane::Far => w - z,
             Plane::LeastW => w - f64::from(LEAST_W),
             Plane::Guard(side) => {
@@ -110,7 +115,7 @@ impl Clipper<'_> {
         // Rounding may have moved the vertex off the plane.
         let position = &mut new.position;
         match plane {
-            Plane::Near => position[2] = 0.0,
+            Plane::Near => position[2] = self.near() * position[3],
             Plane::Far => position[2] = position[3],
             Plane::LeastW => position[3] = LEAST_W.into(),
             Plane::Guard(side) => {
@@ -136,7 +141,7 @@ impl Clipper<'_> {
         let (a, b) = (&corners[p], &corners[q]);
         let crossed = |i: usize, j: usize| a[i] * b[j] - b[i] * a[j];
         let position = |i: usize| match plane {
-            Plane::Near => crossed(i, 2),
+            Plane::Near => crossed(i, 2) - self.near() * crossed(i, 3),
             Plane::Far => crossed(i, 3) - crossed(i, 2),
             Plane::LeastW => crossed(i, 3) - f64::from(LEAST_W) * (a[i] - b[i]),
             Plane::Guard(side) => {

@@ -116,7 +116,7 @@ impl<'a> FrontEnd<'a> {
         let clip_depth = state.depth_clip.unwrap_or(!state.depth_clamp);
         let transforms = viewports
             .clone()
-            .map(|viewport| Transform::new(viewport, clip_depth));
+            .map(|viewport| Transform::new(viewport, clip_depth, state.negative_one_to_one));
         let scissors = state
             .scissors
             .iter()

@@ -50,6 +50,8 @@ pub(super) struct Transform {
     pub translate: [f32; 3],
     /// True if the near and far planes clip.
     pub clip_depth: bool,
+    /// The normalized device coordinate of the near plane, 0 or -1; that of the far plane is 1.
+    pub near: f32,
 }
 
 /// A vertex in the framebuffer.
@@ -107,22 +109,22 @@ impl Transform {
         scale: [0.0; 3],
         translate: [0.0; 3],
         clip_depth: true,
+        near: 0.0,
     };
 
-    pub(super) fn new(viewport: &Viewport, clip_depth: bool) -> Self {
+    pub(super) fn new(viewport: &Viewport, clip_depth: bool, negative_one_to_one: bool) -> Self {
         let (half_width, half_height) = (0.5 * viewport.width, 0.5 * viewport.height);
+        let (first, last) = (viewport.min_depth, viewport.max_depth);
+        let (near, scale, translate) = if negative_one_to_one {
+            (-1.0, 0.5 * (last - first), 0.5 * (last + first))
+        } else {
+            (0.0, last - first, first)
+        };
         Self {
-            scale: [
-                half_width,
-                half_height,
-                viewport.max_depth - viewport.min_depth,
-            ],
-            translate: [
-                half_width + viewport.x,
-                half_height + viewport.y,
-                viewport.min_depth,
-            ],
+            scale: [half_width, half_height, scale],
+            translate: [half_width + viewport.x, half_height + viewport.y, translate],
             clip_depth,
+            near,
         }
     }
 
@@ -155,7 +157,7 @@ impl Transform {
         code |= bit(behind, code::BEHIND);
         code |= bit(x < -w, code::SIDES[0]) | bit(x > w, code::SIDES[1]);
         code |= bit(y < -w, code::SIDES[2]) | bit(y > w, code::SIDES[3]);
-        code |= bit(self.clip_depth & (z < 0.0), code::NEAR);
+        code |= bit(self.clip_depth & (z < self.near * w), code::NEAR);
         code |= bit(self.clip_depth & (z > w), code::FAR);
         let guard = GUARD as f32;
         let [wx, wy] = projected.window;

@@ -137,7 +137,9 @@ pub struct GaussianState {
     pub transmittance_floor: f32,
     /// The errors that are permitted.
     pub approximation: GaussianApproximation,
-    /// The mask of samples that may be covered.
+    /// Whether depths before the viewport, and those of clip space, are from -1, not from 0, to 1.
+    pub negative_one_to_one: bool,
+    /// The samples that may be covered.
     pub sample_mask: u32,
     /// The depth and stencil state. Gaussians are front-facing.
     pub depth_stencil: DepthStencil,
@@ -165,6 +167,7 @@ impl Default for GaussianState {
             alpha_ceiling: 0.99,
             transmittance_floor: 1e-4,
             approximation: GaussianApproximation::default(),
+            negative_one_to_one: false,
             sample_mask: u32::MAX,
             depth_stencil: DepthStencil::default(),
             logic_op: None,

@@ -283,7 +283,9 @@ pub struct DrawState {
     pub depth_clamp: bool,
     /// True if primitives are clipped at the near and far planes. `None` follows from `depth_clamp`.
     pub depth_clip: Option<bool>,
-    /// True if nothing is rasterized.
+    /// Whether clip space's depths are from -w, not from 0, to w.
+    pub negative_one_to_one: bool,
+    /// Nothing is rasterized.
     pub rasterizer_discard: bool,
     /// The part of polygons that is drawn.
     pub polygon_mode: PolygonMode,
@@ -343,6 +345,7 @@ impl DrawState {
             }],
             depth_clamp: false,
             depth_clip: None,
+            negative_one_to_one: false,
             rasterizer_discard: false,
             polygon_mode: PolygonMode::Fill,
             cull_front: false,

@@ -22,7 +22,7 @@ pub enum MipmapMode {
     Linear,
 }
 
-/// The treatment of coordinates outside the image, along one axis. Cubes ignore it.
+/// What coordinates outside the image mean, along one axis. Cubes without seams have no outside and ignore it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum AddressMode {
     /// The image repeats.
@@ -94,7 +94,9 @@ pub struct Sampler {
     pub compare_op: Option<CompareOp>,
     /// The colour outside of the image.
     pub border_color: BorderColor,
-    /// True if coordinates count texels of the view's first level, the only level that is read.
+    /// Whether a cube's faces are images of their own, each with an outside.
+    pub has_seams: bool,
+    /// Coordinates count texels of the view's first level, the only one that is read.
     pub unnormalized_coordinates: bool,
     /// The most samples along a pixel's footprint. With 1, filtering is isotropic.
     pub max_anisotropy: f32,
@@ -114,6 +116,7 @@ impl Default for Sampler {
             max_lod: f32::MAX,
             compare_op: None,
             border_color: BorderColor::default(),
+            has_seams: false,
             unnormalized_coordinates: false,
             max_anisotropy: 1.0,
             reduction: Reduction::default(),

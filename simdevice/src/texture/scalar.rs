@@ -138,6 +138,10 @@ impl Reader<'_> {
         if dimension == Dimension::Cube {
             let hit = cube::Hit::new([coordinate[0], coordinate[1], coordinate[2]]);
             self.layer = 6 * layer(layers / 6);
+            if self.sampler.has_seams {
+                self.layer += hit.face;
+                return self.grid(&hit.coordinates(), [0; 3], filter);
+            }
             let taps = hit.coordinates().map(|s| {
                 let u = addressing::texel_coordinate(AddressMode::ClampToEdge, s, true, extent[0]);
                 addressing::first_texel(filter, u)
@@ -150,17 +154,24 @@ impl Reader<'_> {
             };
         }
         self.layer = layer(layers);
+        let offset = [0, 1, 2].map(|axis: usize| request.offset[axis][lane].cast_signed());
+        self.grid(&coordinate[..count], offset, filter)
+    }
+
+    /// The texels of coordinates, of which there are as many as the image has axes.
+    fn grid(&self, coordinate: &[f32], offset: [i32; 3], filter: Filter) -> Footprint {
+        let extent = self.surface.levels[self.level].extent;
         let axis = |axis: usize| {
-            if axis >= count {
+            let Some(coordinate) = coordinate.get(axis) else {
                 return (Taps::FLAT, Filter::Nearest);
-            }
+            };
             let taps = Taps::new(
                 self.sampler.address_modes[axis],
                 filter,
-                coordinate[axis],
+                *coordinate,
                 !self.sampler.unnormalized_coordinates,
                 extent[axis],
-                request.offset[axis][lane].cast_signed(),
+                offset[axis],
             );
             (taps, filter)
         };

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::texels::{PackedLevel, TexelCodec, VectorLayout};
 use super::view::{ComponentSwizzle, IDENTITY, SampledImage, StorageImage, Swizzle, TexelBuffer};
 use crate::format::{Aspect, Channel, Format, MAX_TEXEL_SIZE};
-use crate::image::ImageView;
+use crate::image::{ImageKind, ImageView};
 
 /// The largest extent that is read 16 lanes at a time: texel indices up to it are exact as floats.
 const MAX_EXTENT: u32 = 1 << 16;
@@ -73,13 +73,20 @@ impl Surface {
         let view = &view.decompressed()?;
         let image = &view.image;
         let format = view.format.plane(aspect)?;
+        // A view of one slice of a 3D image has the slice for a layer.
+        let (layer, slice) = match image.desc.kind {
+            ImageKind::D3 => (0, view.base_layer),
+            ImageKind::D1 | ImageKind::D2 => (view.base_layer, 0),
+        };
         let levels: Vec<Level> = (0..view.level_count.min(image.desc.mip_levels))
             .map_while(|level| {
                 let level = view.base_mip_level.checked_add(level)?;
-                let layout = image.subresource(aspect, level, view.base_layer)?;
-                (layout.format.texel_size() == format.texel_size()).then_some(Level {
-                    extent: layout.extent,
-                    offset: image.offset + layout.offset,
+                let layout = image.subresource(aspect, level, layer)?;
+                let [width, height, depth] = layout.extent;
+                let is_there = layout.format.texel_size() == format.texel_size() && slice < depth;
+                is_there.then_some(Level {
+                    extent: [width, height, depth - slice],
+                    offset: image.offset + layout.offset + u64::from(slice) * layout.depth_pitch,
                     row_pitch: layout.row_pitch,
                     depth_pitch: layout.depth_pitch,
                     sample_pitch: layout.sample_pitch,
@@ -90,7 +97,7 @@ impl Surface {
         if levels.is_empty() {
             return None;
         }
-        let layers = image.desc.array_layers.saturating_sub(view.base_layer);
+        let layers = image.desc.array_layers.saturating_sub(layer);
         let layers = layers.min(view.layer_count);
         if layers == 0 {
             return None;

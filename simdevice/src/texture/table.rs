@@ -62,7 +62,8 @@ impl ImageTable {
         sampler: &Sampler,
         request: &SampleRequest,
     ) -> [LaneWords; 4] {
-        let batched = if self.batched {
+        let has_seams = sampler.has_seams && request.shape.dimension == Dimension::Cube;
+        let batched = if self.batched && !has_seams {
             dispatch!(self.level, simd => {
                 match vector::bilinear(simd, surface, sampler, request) {
                     None => vector::general(simd, surface, sampler, request),

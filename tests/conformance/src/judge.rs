@@ -179,6 +179,7 @@ fn tests(draw: &Draw) -> OracleTests {
     let depth = draw.depth.as_ref().expect("a depth attachment");
     let viewport = draw.viewport();
     OracleTests {
+        negative_one_to_one: false,
         depth_coefficients: draw.camera.depth_coefficients,
         depth_range: [viewport.min_depth, viewport.max_depth],
         format: depth.oracle_format(),

@@ -108,6 +108,7 @@ impl Interleaving {
     /// The tests of a Gaussian draw.
     pub fn tests(&self, test: DepthTest) -> OracleTests {
         OracleTests {
+            negative_one_to_one: false,
             depth_coefficients: self.depth_coefficients,
             depth_range: [0.0, 1.0],
             format: OracleDepthFormat::Float,

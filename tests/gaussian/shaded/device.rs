@@ -165,6 +165,8 @@ pub struct Case<'a> {
     pub outputs: &'a [OracleOutputs],
     /// The parts of them that are separate draws.
     pub draws: Vec<Draw>,
+    /// Whether clip space's depths are from -w, not from 0, to w.
+    pub negative_one_to_one: bool,
     pub depth: Option<(CompareOp, bool)>,
     pub resolve: Option<GaussianFragmentStage>,
     /// The draws before.
@@ -222,6 +224,7 @@ pub fn whole<'a>(device: &Device, outputs: &'a [OracleOutputs]) -> Case<'a> {
         viewport: UPRIGHT,
         outputs,
         draws: vec![draw(device, outputs, 0, outputs.len() as u32)],
+        negative_one_to_one: false,
         depth: None,
         resolve: None,
         before: Vec::new(),
@@ -248,6 +251,7 @@ impl Case<'_> {
             alpha_floor: state.alpha_floor,
             alpha_ceiling: state.alpha_ceiling,
             transmittance_floor: state.transmittance_floor,
+            negative_one_to_one: self.negative_one_to_one,
             depth_stencil: DepthStencil {
                 depth: self
                     .depth

@@ -257,6 +257,46 @@ fn centres_are_tested_for_depth_and_the_median_is_stored() {
 }
 
 #[gaurast_runner::test]
+fn clip_space_may_begin_at_minus_w() {
+    let device = device(SimdLevel::Best);
+    let outputs = cloud(36, 1200);
+    let moved: Vec<_> = outputs
+        .iter()
+        .map(|one| {
+            let mut one = *one;
+            let [_, _, z, w] = one.position;
+            one.position[2] = 2.0 * z - w;
+            one
+        })
+        .collect();
+    let depth = |one: &OracleOutputs| {
+        let [_, _, z, w] = one.position.map(f64::from);
+        (z / w / 2.0 + 0.5) as f32
+    };
+    let depths: Vec<f32> = moved.iter().map(depth).collect();
+    let case = |outputs, negative_one_to_one| Case {
+        negative_one_to_one,
+        draws: vec![draw(&device, outputs, 0, 1200)],
+        ..whole(&device, outputs)
+    };
+    let [expected, drawn] = [(&outputs[..], false), (&moved[..], true)]
+        .map(|(outputs, both)| case(outputs, both).run(&device));
+    assert!(drawn.color == expected.color);
+    let clipped = case(&moved, false).run(&device);
+    assert!(clipped.counters.get(Counter::SkippedNear) > 100);
+    assert_eq!(drawn.counters.get(Counter::SkippedNear), 0);
+    let stored = Case {
+        depth: Some((CompareOp::Less, true)),
+        ..case(&moved, true)
+    };
+    let stored = stored.run(&device).depth;
+    let before = stored.iter().filter(|&&depth| depth != 0.5);
+    let before: Vec<_> = before.collect();
+    assert!(before.len() > 1000, "{}", before.len());
+    assert!(before.into_iter().all(|depth| depths.contains(depth)));
+}
+
+#[gaurast_runner::test]
 fn neither_threads_nor_flushes_change_a_bit() {
     let outputs = cloud(36, 5000);
     let one = device(SimdLevel::Best);

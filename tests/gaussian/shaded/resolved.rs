@@ -335,6 +335,7 @@ fn fixed_function_projection_is_resolved_in_the_depths_of_its_camera() {
         ),
     ] {
         let tests = OracleTests {
+            negative_one_to_one: false,
             depth_coefficients,
             depth_range: [0.0, 1.0],
             format: oracle,

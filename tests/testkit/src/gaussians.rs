@@ -122,6 +122,8 @@ pub struct GaussianOptions<'a> {
     pub formats: Formats,
     /// The render pass in which it is used, or `None` for dynamic rendering.
     pub render_pass: Option<vk::RenderPass>,
+    /// Whether depths before the viewport are from -1, not from 0, to 1.
+    pub negative_one_to_one: bool,
     /// Depth and stencil tests.
     pub depth_stencil: vk::PipelineDepthStencilStateCreateInfo<'static>,
     /// The samples that are written.
@@ -155,6 +157,7 @@ impl GaussianOptions<'_> {
             instances: None,
             formats: Formats::of(vk::Format::R32G32B32A32_SFLOAT),
             render_pass: None,
+            negative_one_to_one: false,
             depth_stencil: vk::PipelineDepthStencilStateCreateInfo::default(),
             sample_mask: u32::MAX,
             blend: vec![opaque()],
@@ -212,6 +215,7 @@ impl GaussianPipeline {
             attributes: all_attributes(options),
             topology: PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST,
             sample_mask: Some(options.sample_mask),
+            negative_one_to_one: options.negative_one_to_one,
             depth_stencil: options.depth_stencil,
             logic_op: options.logic_op,
             blend,

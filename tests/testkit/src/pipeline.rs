@@ -67,7 +67,9 @@ pub struct Graphics<'a> {
     pub restart: bool,
     /// Number of viewports and of scissors.
     pub viewports: u32,
-    /// True if the last vertex of a primitive is the provoking one.
+    /// Whether clip space's depths are from -w, not from 0, to w.
+    pub negative_one_to_one: bool,
+    /// Whether the last vertex of a primitive has what is flat.
     pub provoking_last: bool,
     /// Rasterization.
     pub raster: vk::PipelineRasterizationStateCreateInfo<'static>,
@@ -112,6 +114,7 @@ impl Default for Graphics<'_> {
             topology: vk::PrimitiveTopology::TRIANGLE_LIST,
             restart: false,
             viewports: 1,
+            negative_one_to_one: false,
             provoking_last: false,
             raster: vk::PipelineRasterizationStateCreateInfo::default().line_width(1.0),
             multisample: vk::PipelineMultisampleStateCreateInfo::default()
@@ -216,9 +219,14 @@ impl Graphics<'_> {
         let assembly = vk::PipelineInputAssemblyStateCreateInfo::default()
             .topology(self.topology)
             .primitive_restart_enable(self.restart);
-        let viewport = vk::PipelineViewportStateCreateInfo::default()
+        let mut control = vk::PipelineViewportDepthClipControlCreateInfoEXT::default()
+            .negative_one_to_one(self.negative_one_to_one);
+        let mut viewport = vk::PipelineViewportStateCreateInfo::default()
             .viewport_count(self.viewports)
             .scissor_count(self.viewports);
+        if self.negative_one_to_one {
+            viewport = viewport.push_next(&mut control);
+        }
         let mask: Vec<_> = self.sample_mask.into_iter().collect();
         let mut multisample = self.multisample;
         if !mask.is_empty() {
@@ -321,6 +329,8 @@ pub struct PipelineOptions<'a> {
     pub topology: vk::PrimitiveTopology,
     /// True if an index of all ones begins a new primitive.
     pub restart: bool,
+    /// Whether clip space's depths are from -w, not from 0, to w.
+    pub negative_one_to_one: bool,
     /// Rasterization.
     pub raster: vk::PipelineRasterizationStateCreateInfo<'static>,
     /// The minimum share of samples that are shaded separately, or `None` without sample shading.
@@ -362,6 +372,7 @@ impl Default for PipelineOptions<'_> {
             ],
             topology: vk::PrimitiveTopology::TRIANGLE_LIST,
             restart: false,
+            negative_one_to_one: false,
             raster: vk::PipelineRasterizationStateCreateInfo::default().line_width(1.0),
             sample_shading: None,
             sample_mask: u32::MAX,
@@ -472,6 +483,7 @@ impl Pipeline {
             attributes: options.vertex_attributes.clone(),
             topology: options.topology,
             restart: options.restart,
+            negative_one_to_one: options.negative_one_to_one,
             raster: options.raster,
             multisample: vk::PipelineMultisampleStateCreateInfo::default()
                 .rasterization_samples(vk::SampleCountFlags::from_raw(formats.samples))

@@ -251,6 +251,55 @@ fn pointers_are_chosen_at_run_time() {
     assert!(writable.eq([true; 4]));
 }
 
+/// Copies between layouts, choices of whole structs, narrowed constants, loop controls, copies with two memory operands,
+/// variables that nothing writes, and decorations by strings.
+#[gaurast_runner::test]
+fn additions_of_1_4_are_translated() {
+    let source: Vec<u32> = (0..16 * LANES as u32).map(|word| 1000 + word).collect();
+    let results = run("spirv_1_4.comp", &[&buffer(&source)], 6 * LANES);
+    let row = |index: usize| &results[LANES * index..][..LANES];
+    for at in 0..LANES {
+        let is_odd = at % 2 == 1;
+        let element = |pair: usize, index: usize| source[16 * pair + 4 + 4 * index];
+        assert_eq!(
+            row(0)[at],
+            source[16 * at] + element(at, at % 3),
+            "copied, lane {at}"
+        );
+        let chosen = if is_odd { at } else { 0 };
+        assert_eq!(row(1)[at], element(chosen, 2), "chosen, lane {at}");
+        assert_eq!(row(2)[at], 70_001 & 0xffff, "narrowed, lane {at}");
+        assert_eq!(row(3)[at], if is_odd { 28 } else { 6 }, "looped, lane {at}");
+        assert_eq!(row(4)[at], element(at, 2), "copied in memory, lane {at}");
+        let low = at as u32 % 4;
+        assert_eq!(
+            row(5)[at],
+            (low + 2).pow(2) * (low + 1),
+            "looked up, lane {at}"
+        );
+    }
+}
+
+#[gaurast_runner::test]
+fn older_subgroup_operations_are_the_newer_ones() {
+    const SIZE: u32 = crate::common::OPTIONS.subgroup_size;
+    let results = run("subgroups_khr.comp", &[], 6 * LANES);
+    let row = |index: usize| &results[LANES * index..][..LANES];
+    for at in 0..LANES as u32 {
+        let (lane, own, first) = (at as usize, at % SIZE, at / SIZE * SIZE);
+        assert_eq!(row(0)[lane], 0xaaaa, "ballot, lane {at}");
+        assert_eq!(row(1)[lane], first + 64 * (first + 3), "moved, lane {at}");
+        assert_eq!(
+            row(2)[lane],
+            if first == 0 { 2 } else { 6 },
+            "voted, lane {at}"
+        );
+        assert_eq!(row(3)[lane], own + 64 * SIZE, "numbered, lane {at}");
+        assert_eq!(row(4)[lane], 1 << own, "equal, lane {at}");
+        assert_eq!(row(5)[lane], (1 << own) - 1, "below, lane {at}");
+    }
+}
+
 #[gaurast_runner::test]
 fn blocks_of_shared_memory_lie_in_one_place() {
     let results = run("shared_blocks.comp", &[], 3 * LANES);

@@ -70,7 +70,15 @@ impl Execution<'_> {
 /// # Errors
 /// [`Error::DeviceLost`] if the device is lost during execution; the rest of the command buffer is then not executed.
 pub(super) fn replay(commands: &[Command], execution: &mut Execution<'_>) -> Result<(), Error> {
-    let mut state = State::default();
+    replay_from(State::default(), commands, execution)
+}
+
+/// Replays commands from a state on.
+fn replay_from(
+    mut state: State,
+    commands: &[Command],
+    execution: &mut Execution<'_>,
+) -> Result<(), Error> {
     commands
         .iter()
         .try_for_each(|command| execute(command, &mut state, execution))
@@ -81,6 +89,9 @@ fn execute(
     state: &mut State,
     execution: &mut Execution<'_>,
 ) -> Result<(), Error> {
+    if state.discards && is_conditional(command) {
+        return Ok(());
+    }
     match command {
         Command::Packet(packet) => execution.execute(packet)?,
         Command::BindPipeline(pipeline) => {
@@ -152,6 +163,16 @@ fn execute(
                 dispatch(state, [0; 3], count, execution)?;
             }
         }
+        Command::BeginConditional {
+            predicate,
+            is_inverted,
+        } => {
+            let mut word = [0u32];
+            // The range was checked when the command was recorded.
+            let is_read = predicate.memory.read(predicate.offset, &mut word).is_ok();
+            state.discards = is_read && (word == [0]) != *is_inverted;
+        }
+        Command::EndConditional => state.discards = false,
         Command::SetEvent(event, value) => event.set(*value),
         Command::WaitEvents(events) => {
             for event in events {
@@ -165,14 +186,31 @@ fn execute(
             }
         }
         Command::Execute(secondaries) => {
+            // They inherit the condition, and no bound state, which is undefined after them.
+            let inherited = State {
+                discards: state.discards,
+                ..State::default()
+            };
             for commands in secondaries {
-                replay(commands, execution)?;
+                replay_from(inherited.clone(), commands, execution)?;
             }
-            // Bound state is undefined after secondaries.
-            *state = State::default();
+            *state = inherited;
         }
     }
     Ok(())
+}
+
+/// Tells if conditional rendering decides whether a command is executed.
+fn is_conditional(command: &Command) -> bool {
+    matches!(
+        command,
+        Command::Draw(_)
+            | Command::DrawMulti(_)
+            | Command::DrawIndirect(_)
+            | Command::Dispatch { .. }
+            | Command::DispatchIndirect(_)
+            | Command::Packet(Packet::ClearAttachments(_))
+    )
 }
 
 fn draw(

@@ -50,7 +50,9 @@ pub(crate) struct State {
     pub(crate) cameras: Box<[Camera]>,
     /// The buffer of spherical harmonics.
     pub(crate) harmonics: Option<HarmonicsBuffer>,
-    /// The sorted set that draws share, if one has begun.
+    /// True where draws, dispatches and clears of attachments are not executed.
+    pub(crate) discards: bool,
+    /// The sorted set that draws share, if one was begun.
     pub(crate) gaussian_set: Option<SharedSet>,
 }
 

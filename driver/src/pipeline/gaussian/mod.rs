@@ -321,6 +321,7 @@ fn state(
         alpha_ceiling: gaussian.alpha_ceiling,
         transmittance_floor: gaussian.transmittance_floor,
         approximation: GaussianApproximation::default(),
+        negative_one_to_one: fragments.negative_one_to_one,
         sample_mask: fragments.sample_mask,
         depth_stencil: fragments.depth_stencil,
         logic_op: fragments.logic_op,

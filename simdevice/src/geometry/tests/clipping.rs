@@ -31,8 +31,9 @@ fn amounts(triangle: &[[f32; 4]], at: [f64; 2]) -> Option<[f64; 3]> {
     (determinant.abs() > 1e-9).then(|| [amount(b, c), amount(c, a), amount(a, b)])
 }
 
-/// True if a triangle is visible at a point in pixels, given its depth and its clip distances.
-fn visible(triangle: &[[f32; 4]], distances: &[[f32; 4]], clip_depth: bool, at: [f64; 2]) -> bool {
+/// Whether a triangle, its depth and its clip distances are visible at a point in pixels; `near` is the depth of the near
+/// plane, if there is one.
+fn visible(triangle: &[[f32; 4]], distances: &[[f32; 4]], near: Option<f64>, at: [f64; 2]) -> bool {
     let Some(amounts) = amounts(triangle, at) else {
         return false;
     };
@@ -45,7 +46,7 @@ fn visible(triangle: &[[f32; 4]], distances: &[[f32; 4]], clip_depth: bool, at: 
     };
     let z = sum([0, 1, 2].map(|corner: usize| triangle[corner][2]));
     amounts.iter().all(|&amount| amount >= 0.0)
-        && (!clip_depth || (0.0..=1.0).contains(&z))
+        && near.is_none_or(|near| (near..=1.0).contains(&z))
         && (0..2).all(|index| sum([0, 1, 2].map(|corner: usize| distances[corner][index])) >= 0.0)
 }
 
@@ -81,10 +82,15 @@ fn what_is_left_is_what_is_visible() {
     let device = device(1);
     let mut rng = ChaCha8Rng::seed_from_u64(21);
     let (mut inside, mut checked, mut cut) = (0, 0, 0);
-    for clip_depth in [true, false] {
-        let positions: Vec<_> = (0..3 * 400)
+    for near in [Some(0.0), None, Some(-1.0)] {
+        let mut positions: Vec<_> = (0..3 * 400)
             .map(|_| random_position(&mut rng, 3000.0))
             .collect();
+        if near == Some(-1.0) {
+            positions
+                .iter_mut()
+                .for_each(|[_, _, z, w]| *z = 2.0 * *z - *w);
+        }
         let distances: Vec<[f32; 4]> = positions
             .iter()
             .map(|_| {
@@ -98,7 +104,8 @@ fn what_is_left_is_what_is_visible() {
             .collect();
         let programs = programs(&[VertexOutput::ClipDistance(0), VertexOutput::ClipDistance(1)]);
         let mut draw_state = state(Topology::TriangleList);
-        draw_state.depth_clamp = !clip_depth;
+        draw_state.depth_clamp = near.is_none();
+        draw_state.negative_one_to_one = near == Some(-1.0);
         let mut draw = draw_with(&device, programs, draw_state, &positions);
         draw.attributes
             .push(stream(&distances, crate::Format::R32G32B32A32Sfloat));
@@ -122,7 +129,7 @@ fn what_is_left_is_what_is_visible() {
                         pixel[0] as f64 + 0.5 + x / 64.0,
                         pixel[1] as f64 + 0.5 + y / 64.0,
                     ];
-                    visible(triangle, distances, clip_depth, at)
+                    visible(triangle, distances, near, at)
                 });
                 if seen.iter().all(|&other| other == seen[0]) {
                     let expected = usize::from(seen[0]);
@@ -196,7 +203,7 @@ fn meshes_stay_watertight_where_they_are_clipped() {
                         let at = [at[0] + dx, at[1] + dy];
                         triangles
                             .iter()
-                            .any(|triangle| visible(triangle, &[[0.0; 4]; 3], true, at))
+                            .any(|triangle| visible(triangle, &[[0.0; 4]; 3], Some(0.0), at))
                     };
                     let around = [
                         [0.0, 0.0],

@@ -89,8 +89,11 @@ fn only_what_covers_nothing_is_dropped() {
         .iter()
         .map(|primitive| primitive.id)
         .collect();
-    let transform =
-        super::super::viewport::Transform::new(&state(Topology::TriangleList).viewports[0], false);
+    let transform = super::super::viewport::Transform::new(
+        &state(Topology::TriangleList).viewports[0],
+        false,
+        false,
+    );
     for (id, triangle) in (0..).zip(positions.chunks(3)) {
         let mut corners = [0, 1, 2].map(|i: usize| transform.project(triangle[i]).snapped);
         if area(corners) < 0 {

@@ -40,7 +40,7 @@ fn the_viewport_maps_with_one_rounding_after_the_division() {
             max_depth: rng.random_range(0.0..1.0),
         };
         let position: [f32; 4] = std::array::from_fn(|_| rng.random_range(0.1..3.0));
-        let projected = Transform::new(&viewport, false).project(position);
+        let projected = Transform::new(&viewport, false, false).project(position);
         let inverse = 1.0 / position[3];
         let half = [0.5 * viewport.width, 0.5 * viewport.height];
         let x = (position[0] * inverse).mul_add(half[0], half[0] + viewport.x);
@@ -112,8 +112,8 @@ fn snapping_does_not_move_the_plane_of_depth() {
         })
         .collect();
     let drawn = run(&device, &draw(&device, Topology::TriangleList, &positions));
-    let transform = Transform::new(&state(Topology::TriangleList).viewports[0], false);
-    // The depth at a point, of a plane given at three others.
+    let transform = Transform::new(&state(Topology::TriangleList).viewports[0], false, false);
+    // The depth at a place, of a plane given at three others.
     let plane = |corners: [[f64; 2]; 3], depth: [f64; 3], at: [f64; 2]| {
         let area = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| {
             (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])

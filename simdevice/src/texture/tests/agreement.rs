@@ -66,6 +66,7 @@ fn random_sampler(rng: &mut ChaCha8Rng) -> Sampler {
         max_lod: *[1000.0, 1.5].choose(rng).unwrap(),
         compare_op: None,
         border_color: BorderColor::float([0.25, 0.5, 0.75, 1.0]),
+        has_seams: rng.random_range(0..4) == 0,
         unnormalized_coordinates: unnormalized,
         max_anisotropy: *[1.0, 1.0, 4.0].choose(rng).unwrap(),
         reduction: Reduction::WeightedAverage,

@@ -81,6 +81,8 @@ impl OracleStencil {
 pub struct OracleTests {
     /// The camera's `depthCoefficients`.
     pub depth_coefficients: [f32; 2],
+    /// Whether depths before the viewport are from -1, not from 0, to 1.
+    pub negative_one_to_one: bool,
     /// The viewport's depths of 0 and of 1.
     pub depth_range: [f32; 2],
     /// The attachment's depth format.
@@ -104,6 +106,11 @@ impl OracleTests {
             OracleModel::Pinhole | OracleModel::Fisheye | OracleModel::Equirectangular => {
                 c0 + c1 / z
             }
+        };
+        let depth = if self.negative_one_to_one {
+            depth / 2.0 + 0.5
+        } else {
+            depth
         };
         self.format
             .code(near + depth.clamp(0.0, 1.0) * (far - near))
