@@ -42,6 +42,8 @@ pub(crate) struct ViewConstants {
     pub(super) far: f32,
     pub(super) low_pass: f64,
     pub(super) compensated: bool,
+    /// The least ratio of determinants that compensation takes the root of.
+    pub(super) compensation_floor: f64,
     pub(super) alpha_floor: f64,
     pub(super) log2_floor: f64,
     pub(super) sh_degree: u32,
@@ -49,6 +51,8 @@ pub(crate) struct ViewConstants {
     pub(super) optimizations: Optimizations,
     /// How centres become depths, if the draw needs to know.
     pub(super) depth: Option<CenterDepth>,
+    /// Whether identities are kept.
+    pub(super) is_tracked: bool,
 }
 
 impl ViewConstants {
@@ -93,11 +97,13 @@ impl ViewConstants {
             far: camera.far_plane,
             low_pass: f64::from(state.low_pass_variance),
             compensated: state.opacity_compensated,
+            compensation_floor: state.footprint.compensation_floor.into(),
             alpha_floor: state.alpha_floor.into(),
             log2_floor: f64::from(state.alpha_floor).log2().max(LEAST_LOG2_ALPHA),
             sh_degree: state.sh_degree,
             visible,
             depth,
+            is_tracked: false,
             optimizations,
         }
     }

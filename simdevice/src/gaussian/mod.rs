@@ -15,6 +15,7 @@ mod depth_order;
 pub(crate) mod footprint;
 mod frustum;
 mod group_tasks;
+pub(crate) mod identity;
 mod instances;
 mod lanes;
 mod occlusion;
@@ -167,14 +168,17 @@ fn preprocess_set(
 ) -> Result<Preprocessed, SortError> {
     let begin = &set.begin;
     let optimizations = runtime.config().optimizations;
-    let constants = ViewConstants::new(
-        &begin.state,
-        &begin.camera,
-        &begin.viewport,
-        Visible::from(set.bounds),
-        set.depth,
-        optimizations,
-    );
+    let constants = ViewConstants {
+        is_tracked: set.is_tracked(),
+        ..ViewConstants::new(
+            &begin.state,
+            &begin.camera,
+            &begin.viewport,
+            Visible::from(set.bounds),
+            set.depth,
+            optimizations,
+        )
+    };
     let preprocessor = Preprocessor {
         runtime,
         constants: &constants,

@@ -76,6 +76,7 @@ pub(super) fn copy_last(
         to.splats.push(splat);
         // The same Gaussian lies as deep along a pixel's ray.
         to.ray_depths.extend(out.ray_depths.last().copied());
+        to.identities.extend(out.identities.last().copied());
         to.keys.push(key);
         to.reaches.push(reach);
     }

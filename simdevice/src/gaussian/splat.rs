@@ -1,6 +1,7 @@
 //! What projection makes of Gaussians: the rasterizer's nine numbers, and what goes with them.
 
 use super::footprint::{TileFootprint, TileSpan};
+use super::identity::Identity;
 use super::lanes::GROUP;
 use super::ray_depth::RayDepth;
 use super::scratch::ScreenGaussians;
@@ -102,6 +103,8 @@ pub(crate) struct ProjectedGroup {
     pub ray_depths: Vec<RayDepth>,
     /// What each is on the screen, if they are 2D Gaussians.
     pub surfels: Vec<Surfel>,
+    /// Which each is, if a fragment program wants to know.
+    pub identities: Vec<Identity>,
     /// The tiles of each.
     pub reaches: Vec<TileFootprint>,
     /// The tiles of those that reach many.

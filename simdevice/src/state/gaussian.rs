@@ -105,6 +105,33 @@ pub struct GaussianApproximation {
     pub contribution_budget: f32,
 }
 
+/// The shape outside which a Gaussian does not contribute, whatever its alpha. Tiles are 16x16 pixels, from the upper left
+/// corner of the viewport's area on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum GaussianCutOff {
+    /// There is none.
+    #[default]
+    None,
+    /// The ellipse of a Mahalanobis distance.
+    Ellipse,
+    /// The tiles that a square touches, whose half side is the longer standard deviation, rounded up to whole pixels.
+    TileSquare,
+    /// The tiles that a rectangle touches, whose half sides are standard deviations along x and y, rounded up so.
+    TileRectangle,
+}
+
+/// The pixels that Gaussians may reach, and what opacity they have at least. By default they reach all where their alpha
+/// does.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct GaussianFootprint {
+    /// The shape outside which they do not contribute.
+    pub cut_off: GaussianCutOff,
+    /// Its size in standard deviations.
+    pub deviations: f32,
+    /// The least ratio of determinants that compensation takes the root of, 0 to 1.
+    pub compensation_floor: f32,
+}
+
 /// The state of a Gaussian draw that its pipeline fixes. See the extension for each value's meaning.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GaussianState {
@@ -128,6 +155,8 @@ pub struct GaussianState {
     pub alpha_ceiling: f32,
     /// A pixel is finished before its transmittance would fall below this.
     pub transmittance_floor: f32,
+    /// The pixels that they may reach.
+    pub footprint: GaussianFootprint,
     /// How far pixels may be from all that.
     pub approximation: GaussianApproximation,
     /// The samples that may be covered.
@@ -156,6 +185,7 @@ impl Default for GaussianState {
             alpha_floor: 1.0 / 255.0,
             alpha_ceiling: 0.99,
             transmittance_floor: 1e-4,
+            footprint: GaussianFootprint::default(),
             approximation: GaussianApproximation::default(),
             sample_mask: u32::MAX,
             depth_stencil: DepthStencil::default(),

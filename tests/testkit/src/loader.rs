@@ -49,6 +49,7 @@ fn unregistered_structures() -> String {
         PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST as Features,
         PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST as Properties,
         PipelineGaussianApproximationStateCreateInfoGAURAST as Approximation,
+        PipelineGaussianFootprintStateCreateInfoGAURAST as Footprint,
         PipelineGaussianStateCreateInfoGAURAST as State,
     };
     let separator = if cfg!(windows) { ";" } else { ":" };
@@ -60,6 +61,7 @@ fn unregistered_structures() -> String {
             Approximation::STRUCTURE_TYPE,
             size_of::<Approximation<'_>>(),
         ),
+        (Footprint::STRUCTURE_TYPE, size_of::<Footprint<'_>>()),
         (Camera::STRUCTURE_TYPE, size_of::<Camera<'_>>()),
     ]
     .map(|(structure, size)| format!("{}{separator}{size}", structure.as_raw()))

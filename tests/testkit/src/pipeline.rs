@@ -2,7 +2,8 @@
 
 use ash::vk;
 use gaurast::vk::{
-    PipelineGaussianApproximationStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+    PipelineGaussianApproximationStateCreateInfoGAURAST,
+    PipelineGaussianFootprintStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 
 use crate::descriptors::{Binding, Bindings, Sets, write};
@@ -97,6 +98,8 @@ pub struct Graphics<'a> {
     pub gaussian: Option<PipelineGaussianStateCreateInfoGAURAST<'a>>,
     /// What Gaussian draws may leave out.
     pub approximation: Option<PipelineGaussianApproximationStateCreateInfoGAURAST<'static>>,
+    /// The pixels that Gaussians may reach.
+    pub footprint: Option<PipelineGaussianFootprintStateCreateInfoGAURAST<'static>>,
 }
 
 impl Default for Graphics<'_> {
@@ -128,6 +131,7 @@ impl Default for Graphics<'_> {
             subpass: None,
             gaussian: None,
             approximation: None,
+            footprint: None,
         }
     }
 }
@@ -238,6 +242,7 @@ impl Graphics<'_> {
             .stencil_attachment_format(stencil);
         let mut gaussian = self.gaussian.unwrap_or_default();
         let mut approximation = self.approximation.unwrap_or_default();
+        let mut footprint = self.footprint.unwrap_or_default();
         let mut info = vk::GraphicsPipelineCreateInfo::default()
             .stages(stages)
             .vertex_input_state(&vertex_input)
@@ -260,6 +265,9 @@ impl Graphics<'_> {
         }
         if self.approximation.is_some() {
             info = info.push_next(&mut approximation);
+        }
+        if self.footprint.is_some() {
+            info = info.push_next(&mut footprint);
         }
         let cache = vk::PipelineCache::null();
         // SAFETY: see the crate.

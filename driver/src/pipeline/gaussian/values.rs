@@ -1,8 +1,8 @@
 //! The values of a Gaussian pipeline's state that a command may set in its place: their conversion, and their rules.
 
 use crate::abi::error::Error;
-use gaurast::vk::{GaussianAntialiasingGAURAST, GaussianOrderGAURAST};
-use simdevice::state::gaussian::GaussianOrder;
+use gaurast::vk::{GaussianAntialiasingGAURAST, GaussianCutOffGAURAST, GaussianOrderGAURAST};
+use simdevice::state::gaussian::{GaussianCutOff, GaussianOrder};
 
 /// The order of a value, if it is one.
 pub(crate) fn order(value: GaussianOrderGAURAST) -> Option<GaussianOrder> {
@@ -20,6 +20,17 @@ pub(crate) fn is_compensated(value: GaussianAntialiasingGAURAST) -> Option<bool>
     match value {
         GaussianAntialiasingGAURAST::DILATE => Some(false),
         GaussianAntialiasingGAURAST::OPACITY_COMPENSATED => Some(true),
+        _ => None,
+    }
+}
+
+/// The cut-off of a value, if it is one.
+pub(super) fn cut_off(value: GaussianCutOffGAURAST) -> Option<GaussianCutOff> {
+    match value {
+        GaussianCutOffGAURAST::NONE => Some(GaussianCutOff::None),
+        GaussianCutOffGAURAST::ELLIPSE => Some(GaussianCutOff::Ellipse),
+        GaussianCutOffGAURAST::TILE_SQUARE => Some(GaussianCutOff::TileSquare),
+        GaussianCutOffGAURAST::TILE_RECTANGLE => Some(GaussianCutOff::TileRectangle),
         _ => None,
     }
 }
@@ -60,6 +71,17 @@ pub(crate) const EXPONENTIAL_ERROR: Rule = Rule {
 };
 pub(crate) const CONTRIBUTION_BUDGET: Rule = Rule {
     name: "contributionBudget",
+    holds: |value| (0.0..=1.0).contains(&value),
+    must_be: "at least 0 and at most 1",
+};
+
+pub(super) const CUT_OFF_DEVIATIONS: Rule = Rule {
+    name: "cutOffDeviations",
+    holds: |value| value > 0.0 && value.is_finite(),
+    must_be: "finite and greater than 0, since there is a cut-off",
+};
+pub(super) const COMPENSATION_FLOOR: Rule = Rule {
+    name: "compensationFloor",
     holds: |value| (0.0..=1.0).contains(&value),
     must_be: "at least 0 and at most 1",
 };
