@@ -1,8 +1,8 @@
 //! Modes of the pipeline that change what a picture is, not what it costs.
 
 use gaurast::vk::{
-    GaussianAntialiasingGAURAST, GaussianGeometryGAURAST, GaussianOrderGAURAST,
-    GaussianPrecisionGAURAST,
+    GaussianAntialiasingGAURAST, GaussianCutOffGAURAST, GaussianGeometryGAURAST,
+    GaussianOrderGAURAST, GaussianPrecisionGAURAST,
 };
 use serde::{Deserialize, Serialize};
 
@@ -25,6 +25,32 @@ impl Order {
             Self::Depth => GaussianOrderGAURAST::VIEW_DEPTH,
             Self::Distance => GaussianOrderGAURAST::RADIAL_DISTANCE,
             Self::PerPixel => GaussianOrderGAURAST::PER_PIXEL,
+        }
+    }
+}
+
+/// The shape outside which a Gaussian does not contribute, of a number of standard deviations.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum CutOff {
+    /// There is none: they contribute wherever their alpha reaches its floor.
+    #[default]
+    None,
+    /// The ellipse, as glTF's extension has it.
+    Ellipse,
+    /// The tiles of 16x16 pixels that a square touches, as 3DGS has them.
+    TileSquare,
+    /// The tiles that a rectangle touches, as gsplat has them.
+    TileRectangle,
+}
+
+impl CutOff {
+    /// As the pipeline is told.
+    pub(crate) fn raw(self) -> GaussianCutOffGAURAST {
+        match self {
+            Self::None => GaussianCutOffGAURAST::NONE,
+            Self::Ellipse => GaussianCutOffGAURAST::ELLIPSE,
+            Self::TileSquare => GaussianCutOffGAURAST::TILE_SQUARE,
+            Self::TileRectangle => GaussianCutOffGAURAST::TILE_RECTANGLE,
         }
     }
 }

@@ -5,7 +5,7 @@ use gaurast_scene::{Camera, MAX_SH_DEGREE};
 use serde::{Deserialize, Serialize};
 
 use crate::error::RenderError;
-use crate::modes::{Antialiasing, Geometry, Order, Precision};
+use crate::modes::{Antialiasing, CutOff, Geometry, Order, Precision};
 
 /// What a draw may save on: the pipeline's state as far as pictures are the better for it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -15,6 +15,8 @@ pub struct Settings {
     pub sh_degree: u32,
     /// A Gaussian counts where its alpha is at least this.
     pub alpha_floor: f32,
+    /// Alpha is at most this.
+    pub alpha_ceiling: f32,
     /// A pixel is finished before its transmittance would fall below this.
     pub transmittance_floor: f32,
     /// What Gaussians are sorted by.
@@ -29,6 +31,12 @@ pub struct Settings {
     pub contribution_budget: f32,
     /// What becomes of Gaussians that are smaller than a pixel.
     pub antialiasing: Antialiasing,
+    /// The least ratio of determinants that compensated opacity is the root of.
+    pub compensation_floor: f32,
+    /// The shape outside which Gaussians do not contribute.
+    pub cut_off: CutOff,
+    /// The size of that shape in standard deviations.
+    pub cut_off_deviations: f32,
     /// Keep depths, too: see [`Frame::depth`](crate::Frame::depth).
     pub depth: bool,
 }
@@ -39,6 +47,7 @@ impl Default for Settings {
         Self {
             sh_degree: MAX_SH_DEGREE,
             alpha_floor: 1.0 / 255.0,
+            alpha_ceiling: 0.99,
             transmittance_floor: 1e-4,
             order: Order::Depth,
             geometry: Geometry::Volume,
@@ -46,6 +55,9 @@ impl Default for Settings {
             exponential_error: 0.0,
             contribution_budget: 0.0,
             antialiasing: Antialiasing::Dilate,
+            compensation_floor: 0.0,
+            cut_off: CutOff::None,
+            cut_off_deviations: 3.0,
             depth: false,
         }
     }
@@ -82,6 +94,10 @@ impl Settings {
             (
                 half && panorama,
                 "panoramas are not drawn in binary16 (fp16)",
+            ),
+            (
+                self.cut_off != CutOff::None && (surfels || half),
+                "cut-offs, and so other renderers' pictures, are of volumes (3d) in binary32 (fp32)",
             ),
             (self.depth && half, "depths are not kept in binary16 (fp16)"),
             (

@@ -8,6 +8,8 @@ use gaurast_picture::{Background, DEFAULT_QUALITY, Size};
 use gaurast_scene::{MAX_SH_DEGREE, Transform};
 use glam::{DQuat, DVec3};
 
+use crate::renderers::OtherRenderer;
+
 /// What every command's help ends with.
 pub const EXIT_CODES: &str = "Exit codes: 0 done, 1 it failed and one sentence on stderr says why, 2 the command line means \
     nothing.";
@@ -207,6 +209,12 @@ pub struct ModeArguments {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(..=i64::from(MAX_SH_DEGREE)))]
     pub sh_degree: Option<u32>,
 
+    /// Draw the picture that another renderer would: its cut-off, near plane, thresholds and order
+    ///
+    /// --order and --near overrule it. With --antialiasing compensated it is that renderer's compensated mode.
+    #[arg(long = "as", value_name = "RENDERER", value_enum)]
+    pub renderer: Option<OtherRenderer>,
+
     /// What the Gaussians are sorted by
     #[arg(long, value_enum, default_value_t)]
     pub order: Order,
@@ -233,6 +241,18 @@ pub struct ModeArguments {
     /// one of 255 steps, real scenes err by up to 1.16 steps, and rounding to 8 bits may add one.
     #[arg(long, value_name = "B", default_value_t = 0.0, value_parser = part)]
     pub contribution_budget: f32,
+}
+
+impl ModeArguments {
+    /// Camera options, with the near plane of the renderer that is followed, unless they say another one.
+    pub fn cameras(&self, arguments: &CameraArguments) -> CameraArguments {
+        CameraArguments {
+            near: arguments
+                .near
+                .or(self.renderer.and_then(OtherRenderer::near)),
+            ..arguments.clone()
+        }
+    }
 }
 
 /// What is written, and where.

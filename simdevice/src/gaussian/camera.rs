@@ -1,6 +1,7 @@
 //! Cameras: what is the same for all Gaussians of a view, where a point appears, and how it moves in the picture as it moves
 //! in space.
 
+use super::cut_off::TileCutOff;
 use super::depth::CenterDepth;
 use super::footprint::Visible;
 #[cfg(feature = "mistakes")]
@@ -53,6 +54,8 @@ pub(crate) struct ViewConstants {
     pub(super) depth: Option<CenterDepth>,
     /// Whether identities are kept.
     pub(super) is_tracked: bool,
+    /// The cut-off by which tiles are left out.
+    pub(super) list_cut_off: Option<TileCutOff>,
 }
 
 impl ViewConstants {
@@ -104,6 +107,7 @@ impl ViewConstants {
             visible,
             depth,
             is_tracked: false,
+            list_cut_off: list_cut_off(state, camera, viewport),
             optimizations,
         }
     }
@@ -118,6 +122,17 @@ impl ViewConstants {
         let [first, last] = self.visible.pixels(axis);
         [first - 1.0, last + 2.0]
     }
+}
+
+/// The cut-off that lists of tiles see to alone: one in the device's own tiles, of pictures that do not repeat.
+pub(super) fn list_cut_off(
+    state: &GaussianState,
+    camera: &Camera,
+    viewport: &Viewport,
+) -> Option<TileCutOff> {
+    let corner = [viewport.x, viewport.y].map(f64::from);
+    TileCutOff::of(state, corner)
+        .filter(|cut_off| cut_off.is_in_device_tiles() && period(camera).is_none())
 }
 
 /// After how many pixels a camera's picture repeats to the right and to the left, if it does.

@@ -10,6 +10,7 @@ pub mod caches;
 mod camera;
 pub(crate) mod cluster_cache;
 mod clusters;
+pub(crate) mod cut_off;
 pub(crate) mod depth;
 mod depth_order;
 pub(crate) mod footprint;

@@ -1,6 +1,6 @@
 //! A sorted set: what preprocessing, sort and binning make of Gaussians, and what the tile engine draws.
 
-use super::camera::period;
+use super::camera::{list_cut_off, period};
 use super::depth::DepthTrend;
 use super::identity::{Identity, Origins};
 use super::ray_depth::{PixelRays, RayDepth, RayDepths};
@@ -65,6 +65,8 @@ pub struct BinnedDraw {
     pub(crate) camera: Camera,
     /// The upper left corner of the viewport's area, in pixels.
     pub(crate) viewport_corner: [f64; 2],
+    /// Whether lists of tiles see to the cut-off.
+    pub(crate) are_lists_cut: bool,
     /// The draws of the set, if a fragment program reads which Gaussians there are.
     pub(crate) origins: Option<Origins>,
     /// Where the work of its tiles goes, if anybody wants to know.
@@ -134,6 +136,7 @@ impl BinnedDraw {
         Self {
             origins,
             camera: begin.camera,
+            are_lists_cut: list_cut_off(&begin.state, &begin.camera, &begin.viewport).is_some(),
             viewport_corner: [begin.viewport.x, begin.viewport.y].map(f64::from),
             depth_trend: match (set.depth, begin.state.order) {
                 // What a program sorts by need not follow its depths.

@@ -38,7 +38,7 @@ pub(crate) enum DrawError {
     },
     /// A camera of a model that is not enabled.
     #[error(
-        "the camera's model is {0:?}, and its feature is not enabled (VUID-VkGaussianCameraGAURAST-model-parameter)"
+        "the camera's model is {0:?}, and its feature is not enabled (VUID-VkGaussianCameraGAURAST-model-90079)"
     )]
     CameraModel(CameraModel),
     /// A camera of a model that Gaussians of the pipeline's modes cannot be seen by.

@@ -153,8 +153,18 @@ fn not_enabled((_, name, vuid): Feature, what: &str) -> Error {
 }
 
 pub(super) fn unknown(field: &str, value: &dyn std::fmt::Debug) -> Error {
+    let vuid = match field {
+        "flags" => "VUID-VkPipelineGaussianStateCreateInfoGAURAST-flags-parameter",
+        "geometry" => "VUID-VkPipelineGaussianStateCreateInfoGAURAST-geometry-parameter",
+        "linearization" => "VUID-VkPipelineGaussianStateCreateInfoGAURAST-linearization-parameter",
+        "order" => "VUID-VkPipelineGaussianStateCreateInfoGAURAST-order-parameter",
+        "precision" => "VUID-VkPipelineGaussianStateCreateInfoGAURAST-precision-parameter",
+        "antialiasing" => "VUID-VkPipelineGaussianStateCreateInfoGAURAST-antialiasing-parameter",
+        "cameraSource" => "VUID-VkPipelineGaussianStateCreateInfoGAURAST-cameraSource-parameter",
+        _ => "VUID-VkPipelineGaussianStateCreateInfoGAURAST-projectionMode-parameter",
+    };
     Error::usage(
-        "VUID-VkPipelineGaussianStateCreateInfoGAURAST-parameter",
+        vuid,
         format!("{STRUCTURE}: {field} has the unknown value {value:?}"),
     )
 }
@@ -407,14 +417,14 @@ pub(super) fn stages(
         other => return Err(unknown("projectionMode", &other)),
     }
     if has_fragment_stage(info) {
-        let what = "the pipeline has a fragment stage";
-        require(features, RESOLVE_FRAGMENT_SHADER, what)?;
         let inputs = &gaussian.resolve_input_locations;
         let indices = [inputs.median_gaussian, inputs.nearest_gaussian];
         if indices != [GAUSSIAN_LOCATION_UNUSED_GAURAST; 2] {
             let what = "medianGaussian or nearestGaussian is used";
             require(features, RESOLVE_INDICES, what)?;
         }
+        let what = "the pipeline has a fragment stage";
+        require(features, RESOLVE_FRAGMENT_SHADER, what)?;
     }
     let shaded = is_shaded(gaussian);
     let of = |wanted| info.stages().filter(move |(stage, _)| *stage == wanted);

@@ -104,7 +104,8 @@ pub(super) enum Kernel<'a> {
 impl<'a> Kernel<'a> {
     pub(super) fn of(draw: &'a BinnedDraw) -> Self {
         let (surfels, depths) = (draw.surfels(), draw.ray_depths());
-        let (cut_off, identities) = (CutOff::of(draw), draw.identities());
+        let cut_off = CutOff::of(draw).filter(|_| !draw.are_lists_cut);
+        let identities = draw.identities();
         let is_plain = cut_off.is_none() && identities.is_none();
         if draw.state.precision == GaussianPrecision::Float16 {
             Self::Half

@@ -47,10 +47,11 @@ pub(super) fn resolve(chapter: &mut Chapter<'_>) {
                 showing(shown, strange(seed))
             });
         }
+        // Without a floor, what underflows may be the first to contribute or not.
         chapter.add(format!("{name}.lax"), move || {
             showing(shown, dense(327, 0)).in_state(|state| {
                 state
-                    .alpha_floor(0.0)
+                    .alpha_floor(1e-6)
                     .transmittance_floor(0.0)
                     .alpha_ceiling(1.0)
             })
