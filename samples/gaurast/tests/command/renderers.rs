@@ -6,8 +6,8 @@ use std::process::Command;
 
 use tempfile::TempDir;
 
-const WIDTH: usize = 203;
-const HEIGHT: usize = 157;
+const WIDTH: usize = 139;
+const HEIGHT: usize = 107;
 /// Degrees, the vertical field of view.
 const FOV: f64 = 60.0;
 const EYE: [f64; 3] = [0.3, -0.2, -4.0];
@@ -391,7 +391,7 @@ fn folder() -> TempDir {
     folder
 }
 
-/// Few pixels are too close to call: of 31,871.
+/// Few pixels are too close to call: of 14,873.
 const FEW: usize = 20;
 
 #[gaurast_runner::test]
