@@ -134,10 +134,14 @@ fn harmonics_from_a_buffer_are_synchronized_as_the_text_says(case: &Case) {
                     device.cmd_draw(commands, 1, 1, 0, 0);
                 }
             });
+            let written_again = [vk::MemoryBarrier::default()
+                .src_access_mask(Access::TRANSFER_WRITE)
+                .dst_access_mask(Access::TRANSFER_WRITE)];
             // SAFETY: see the crate. What was read may be written again.
             unsafe {
-                let stages = (Stage::VERTEX_SHADER, Stage::TRANSFER);
-                device.cmd_pipeline_barrier(commands, stages.0, stages.1, no, &[], &[], &[]);
+                let before = Stage::VERTEX_SHADER | Stage::TRANSFER;
+                let after = Stage::TRANSFER;
+                device.cmd_pipeline_barrier(commands, before, after, no, &written_again, &[], &[]);
                 device.cmd_fill_buffer(commands, buffer, 0, 12, 1);
             }
         });

@@ -70,9 +70,9 @@ impl Judge<'_> {
         match self.shown {
             Shown::Accumulated => {
                 let mut farthest = 0.0_f64;
-                for channel in 0..4 {
+                for (channel, value) in color.into_iter().enumerate() {
                     let values = ways.iter().map(|way| way.accumulated[channel]);
-                    farthest = farthest.max(within(values, color[channel], CONTRACT)?);
+                    farthest = farthest.max(within(values, value, CONTRACT)?);
                 }
                 Ok(farthest)
             }
