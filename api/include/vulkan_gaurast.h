@@ -33,6 +33,7 @@ extern "C" {
 #define VK_STRUCTURE_TYPE_GAUSSIAN_CAMERA_GAURAST ((VkStructureType)1000997003)
 #define VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_APPROXIMATION_STATE_CREATE_INFO_GAURAST ((VkStructureType)1000997004)
 #define VK_STRUCTURE_TYPE_GAUSSIAN_SPHERICAL_HARMONICS_BUFFER_GAURAST ((VkStructureType)1000997005)
+#define VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_FOOTPRINT_STATE_CREATE_INFO_GAURAST ((VkStructureType)1000997006)
 #define VK_DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST ((VkDynamicState)1000997000)
 #define VK_DYNAMIC_STATE_GAUSSIAN_ANTIALIASING_GAURAST ((VkDynamicState)1000997001)
 #define VK_DYNAMIC_STATE_GAUSSIAN_LOW_PASS_VARIANCE_GAURAST ((VkDynamicState)1000997002)
@@ -95,6 +96,14 @@ typedef enum VkGaussianCameraModelGAURAST {
     VK_GAUSSIAN_CAMERA_MODEL_MAX_ENUM_GAURAST = 0x7FFFFFFF
 } VkGaussianCameraModelGAURAST;
 
+typedef enum VkGaussianCutOffGAURAST {
+    VK_GAUSSIAN_CUT_OFF_NONE_GAURAST = 0,
+    VK_GAUSSIAN_CUT_OFF_ELLIPSE_GAURAST = 1,
+    VK_GAUSSIAN_CUT_OFF_TILE_SQUARE_GAURAST = 2,
+    VK_GAUSSIAN_CUT_OFF_TILE_RECTANGLE_GAURAST = 3,
+    VK_GAUSSIAN_CUT_OFF_MAX_ENUM_GAURAST = 0x7FFFFFFF
+} VkGaussianCutOffGAURAST;
+
 typedef enum VkPipelineGaussianStateCreateFlagBitsGAURAST {
     VK_PIPELINE_GAUSSIAN_STATE_CREATE_LOG_SCALE_BIT_GAURAST = 0x00000001,
     VK_PIPELINE_GAUSSIAN_STATE_CREATE_LOGIT_OPACITY_BIT_GAURAST = 0x00000002,
@@ -129,6 +138,9 @@ typedef struct VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST {
     VkBool32           attributeActivation;
     VkBool32           sphericalHarmonicsBuffer;
     VkBool32           gaussianDynamicState;
+    VkBool32           resolveGaussianIndices;
+    VkBool32           gaussianCutOff;
+    VkBool32           opacityCompensationFloor;
 } VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST;
 
 typedef struct VkPhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST {
@@ -161,6 +173,10 @@ typedef struct VkGaussianVertexOutputLocationsGAURAST {
 typedef struct VkGaussianResolveInputLocationsGAURAST {
     uint32_t    accumulatedColor;
     uint32_t    depth;
+    uint32_t    linearDepth;
+    uint32_t    medianGaussian;
+    uint32_t    nearestGaussian;
+    uint32_t    firstCamera;
 } VkGaussianResolveInputLocationsGAURAST;
 
 typedef struct VkPipelineGaussianStateCreateInfoGAURAST {
@@ -193,6 +209,14 @@ typedef struct VkPipelineGaussianApproximationStateCreateInfoGAURAST {
     float              exponentialError;
     float              contributionBudget;
 } VkPipelineGaussianApproximationStateCreateInfoGAURAST;
+
+typedef struct VkPipelineGaussianFootprintStateCreateInfoGAURAST {
+    VkStructureType            sType;
+    const void*                pNext;
+    VkGaussianCutOffGAURAST    cutOff;
+    float                      cutOffDeviations;
+    float                      compensationFloor;
+} VkPipelineGaussianFootprintStateCreateInfoGAURAST;
 
 typedef struct VkGaussianCameraGAURAST {
     VkStructureType                 sType;

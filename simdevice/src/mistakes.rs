@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::packet::GaussianBegin;
-use crate::state::gaussian::{GaussianLinearization, GaussianOrder};
+use crate::state::gaussian::{GaussianCutOff, GaussianLinearization, GaussianOrder};
 
 macro_rules! mistakes {
     ($($(#[doc = $doc:literal])* $mistake:ident,)*) => {
@@ -91,6 +91,12 @@ mistakes! {
     DiscsBehindNear,
     /// Directions of harmonics are the world's, whatever the model matrix.
     DirectionsOfWorld,
+    /// Nothing is cut off.
+    NoCutOff,
+    /// Cut-offs are ellipses, not tiles.
+    CutOffNotInTiles,
+    /// The compensation of the opacity has no floor.
+    NoCompensationFloor,
 }
 
 /// The number of the mistake that is made, plus one; 0 if none is made.
@@ -125,6 +131,11 @@ pub(crate) fn begin(begin: &GaussianBegin) -> GaussianBegin {
         Mistake::PixelCentres => camera.principal_point = camera.principal_point.map(|c| c + 0.5),
         Mistake::NoLowPass => state.low_pass_variance = 0.0,
         Mistake::NoCompensation => state.opacity_compensated = false,
+        Mistake::NoCutOff => state.footprint.cut_off = GaussianCutOff::None,
+        Mistake::CutOffNotInTiles if state.footprint.cut_off != GaussianCutOff::None => {
+            state.footprint.cut_off = GaussianCutOff::Ellipse;
+        }
+        Mistake::NoCompensationFloor => state.footprint.compensation_floor = 0.0,
         Mistake::FloorExcluded => state.alpha_floor = state.alpha_floor.next_up(),
         Mistake::NoCeiling => state.alpha_ceiling = 1.0,
         Mistake::NeverFinished => state.transmittance_floor = 0.0,

@@ -417,6 +417,14 @@ pub fn broken() -> Vec<(&'static str, String)> {
         request.gaussian = state;
         request
     };
+    let with_camera = || {
+        let mut request = stage.resolved(request(true), &stage.toned, [0, 1]);
+        request.gaussian = request.gaussian.map(|state| {
+            let inputs = state.resolve_input_locations.first_camera(2);
+            state.resolve_input_locations(inputs)
+        });
+        request
+    };
     let read = "VUID-VkGaussianResolveInputLocationsGAURAST-None-90023";
     let requests = [
         // The location is missing, too small, or used twice.
@@ -436,6 +444,10 @@ pub fn broken() -> Vec<(&'static str, String)> {
         (location, with(outputs().color(3))),
         (location, with(outputs().opacity(unused))),
         (location, with(outputs().depth_key(3))),
+        (
+            "VUID-VkGaussianResolveInputLocationsGAURAST-firstCamera-90072",
+            with_camera(),
+        ),
         (
             "VUID-VkPipelineGaussianStateCreateInfoGAURAST-depthKey-90021",
             by_distance(),

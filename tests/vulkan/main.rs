@@ -12,6 +12,7 @@ mod devices;
 mod dynamic_states;
 mod embedded;
 mod gaussian_draws;
+mod gaussian_interactions;
 mod gaussian_modes;
 mod gaussian_pipelines;
 mod gaussian_shaders;

@@ -5,9 +5,10 @@ use crate::scene::{Scene, camera, splat, splats};
 use ash::vk;
 use gaurast::vk::{
     GaussianAntialiasingGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST,
-    GaussianCameraSourceGAURAST, GaussianGeometryGAURAST, GaussianLinearizationGAURAST,
-    GaussianOrderGAURAST, GaussianPrecisionGAURAST, GaussianProjectionModeGAURAST,
-    PipelineGaussianApproximationStateCreateInfoGAURAST, PipelineGaussianStateCreateFlagsGAURAST,
+    GaussianCameraSourceGAURAST, GaussianCutOffGAURAST, GaussianGeometryGAURAST,
+    GaussianLinearizationGAURAST, GaussianOrderGAURAST, GaussianPrecisionGAURAST,
+    GaussianProjectionModeGAURAST, PipelineGaussianApproximationStateCreateInfoGAURAST,
+    PipelineGaussianFootprintStateCreateInfoGAURAST, PipelineGaussianStateCreateFlagsGAURAST,
     PipelineGaussianStateCreateInfoGAURAST,
 };
 use gaurast_testkit::{Gpu, Graphics, Shader};
@@ -16,11 +17,60 @@ use std::collections::BTreeSet;
 const SPECIFICATION: &str =
     include_str!("../../api/spec/VK_GAURAST_gaussian_primitive_topology.adoc");
 
-/// The ids of the statements in the specification.
-fn stated() -> BTreeSet<&'static str> {
+/// The statements that the registry implies.
+const IMPLICIT: &str = include_str!("../../api/spec/implicit_valid_usage.adoc");
+
+/// The ids of a text's statements.
+fn ids(text: &str) -> impl Iterator<Item = &str> {
     let is_of_id = |c: char| c.is_ascii_alphanumeric() || c == '-';
-    let candidates = SPECIFICATION.split(|c: char| !is_of_id(c));
-    candidates.filter(|id| id.starts_with("VUID-")).collect()
+    let candidates = text.split(move |c: char| !is_of_id(c));
+    candidates.filter(|id| id.starts_with("VUID-"))
+}
+
+/// The ids of the specification's statements.
+fn stated() -> BTreeSet<&'static str> {
+    ids(SPECIFICATION).collect()
+}
+
+#[gaurast_runner::test]
+fn statements_have_anchors_and_numbers_of_their_own() {
+    let mut numbers = BTreeSet::new();
+    for id in stated() {
+        let (_, number) = id.rsplit_once('-').unwrap();
+        assert!(number.parse::<u32>().is_ok(), "{id} has no number");
+        assert!(numbers.insert(number), "the number of {id} is another's");
+        let anchor = format!("[[{id}]] *{id}*");
+        assert_eq!(SPECIFICATION.matches(&anchor).count(), 1, "{anchor}");
+    }
+    let implied: Vec<_> = ids(IMPLICIT).collect();
+    let different: BTreeSet<_> = implied.iter().collect();
+    // Once in its anchor, and once in its name.
+    assert_eq!(implied.len(), 2 * different.len());
+}
+
+#[gaurast_runner::test]
+fn every_structure_and_command_has_its_implied_statements() {
+    for id in [
+        "VUID-VkPipelineGaussianStateCreateInfoGAURAST-sType-sType",
+        "VUID-VkPipelineGaussianStateCreateInfoGAURAST-flags-parameter",
+        "VUID-VkPipelineGaussianFootprintStateCreateInfoGAURAST-cutOff-parameter",
+        "VUID-VkGaussianCameraGAURAST-pNext-pNext",
+        "VUID-VkGaussianCameraGAURAST-model-parameter",
+        "VUID-VkGaussianSphericalHarmonicsBufferGAURAST-format-parameter",
+        "VUID-VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST-gaussianCutOff-parameter",
+        "VUID-vkCmdSetGaussianCamerasGAURAST-pCameras-parameter",
+        "VUID-vkCmdSetGaussianCamerasGAURAST-cameraCount-arraylength",
+        "VUID-vkCmdEndGaussianSetGAURAST-renderpass",
+        "VUID-vkCmdSetGaussianOrderGAURAST-commandBuffer-recording",
+        "VUID-vkCmdSetGaussianOrderGAURAST-commandBuffer-cmdpool",
+    ] {
+        assert!(ids(IMPLICIT).any(|implied| implied == id), "{id}");
+    }
+    let returned = "VUID-VkPhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST";
+    let of_returned = ids(IMPLICIT).filter(|id| id.starts_with(returned));
+    let of_returned: Vec<_> = of_returned.collect();
+    assert!(!of_returned.is_empty());
+    assert!(of_returned.iter().all(|id| id.ends_with("-sType")));
 }
 
 type State = PipelineGaussianStateCreateInfoGAURAST<'static>;
@@ -43,7 +93,18 @@ fn allowing(exponential_error: f32, contribution_budget: f32) -> Graphics<'stati
     }
 }
 
-/// Pipelines that violate one statement each.
+fn within(cut_off: GaussianCutOffGAURAST, deviations: f32, floor: f32) -> Graphics<'static> {
+    let footprint = PipelineGaussianFootprintStateCreateInfoGAURAST::default()
+        .cut_off(cut_off)
+        .cut_off_deviations(deviations)
+        .compensation_floor(floor);
+    Graphics {
+        footprint: Some(footprint),
+        ..splats()
+    }
+}
+
+/// Pipelines that break one statement each.
 fn pipelines() -> Vec<(&'static str, Graphics<'static>)> {
     let missing = |index: usize| {
         let mut request = splats();
@@ -67,8 +128,31 @@ fn pipelines() -> Vec<(&'static str, Graphics<'static>)> {
             },
         ),
         (
-            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-parameter",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-order-parameter",
             with(|s| s.order(GaussianOrderGAURAST::from_raw(77))),
+        ),
+        (
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-geometry-parameter",
+            with(|s| s.geometry(GaussianGeometryGAURAST::from_raw(77))),
+        ),
+        (
+            "VUID-VkPipelineGaussianFootprintStateCreateInfoGAURAST-cutOff-parameter",
+            within(GaussianCutOffGAURAST::from_raw(77), 3.0, 0.0),
+        ),
+        (
+            "VUID-VkPipelineGaussianFootprintStateCreateInfoGAURAST-cutOffDeviations-90076",
+            within(GaussianCutOffGAURAST::ELLIPSE, 0.0, 0.0),
+        ),
+        (
+            "VUID-VkPipelineGaussianFootprintStateCreateInfoGAURAST-compensationFloor-90077",
+            within(GaussianCutOffGAURAST::NONE, 0.0, 1.5),
+        ),
+        (
+            "VUID-VkPipelineGaussianFootprintStateCreateInfoGAURAST-cutOff-90078",
+            Graphics {
+                footprint: within(GaussianCutOffGAURAST::TILE_SQUARE, 3.0, 0.0).footprint,
+                ..with(|s| s.geometry(GaussianGeometryGAURAST::GAUSSIAN_2D))
+            },
         ),
         (
             "VUID-VkPipelineGaussianStateCreateInfoGAURAST-sphericalHarmonicsDegree-90010",
@@ -177,6 +261,15 @@ fn modes() -> Vec<(&'static str, Graphics<'static>)> {
         ),
         ("uniformBufferCamera", with(|s| s.camera_source(buffer))),
         ("gaussianApproximation", allowing(1e-3, 0.0)),
+        (
+            "gaussianCutOff",
+            within(GaussianCutOffGAURAST::ELLIPSE, 3.0, 0.0),
+        ),
+        (
+            "opacityCompensationFloor",
+            within(GaussianCutOffGAURAST::NONE, 0.0, 0.5),
+        ),
+        ("resolveGaussianIndices", naming_gaussians()),
         (
             "attributeActivation",
             with(|s| s.flags(PipelineGaussianStateCreateFlagsGAURAST::LOG_SCALE)),
@@ -323,6 +416,8 @@ fn every_statement_is_reported_by_its_id() {
         of_feature("gaussianPrimitiveTopology"),
         without_the_topology(),
     );
+    // [`a_camera_whose_feature_is_not_enabled_draws_nothing_and_says_so`] breaks this one.
+    tested.insert("VUID-VkGaussianCameraGAURAST-model-90079");
     let untested: Vec<_> = stated.difference(&tested).collect();
     assert!(untested.is_empty(), "no test breaks {untested:?}");
 }
@@ -345,7 +440,16 @@ fn flat_through_a_fisheye() -> String {
     scene.gpu.message_texts().concat()
 }
 
-/// The messages about a pipeline with a stage.
+/// A pipeline whose fragment stage reads which Gaussians there are.
+fn naming_gaussians() -> Graphics<'static> {
+    let code = vec![0x0723_0203, 0x0001_0000, 0, 1, 0];
+    Graphics {
+        shaders: vec![Shader::new(vk::ShaderStageFlags::FRAGMENT, code)],
+        ..with(|s| s.resolve_input_locations(s.resolve_input_locations.nearest_gaussian(3)))
+    }
+}
+
+/// What is heard when a pipeline has a stage.
 fn with_a_stage(gpu: &Gpu, stage: vk::ShaderStageFlags, result: vk::Result) -> String {
     let code = vec![0x0723_0203, 0x0001_0000, 0, 1, 0];
     let request = Graphics {
@@ -393,7 +497,7 @@ fn a_camera_whose_feature_is_not_enabled_draws_nothing_and_says_so() {
         });
         assert!(pixels.iter().all(|pixel| *pixel == [0.25; 4]));
         let messages = scene.gpu.message_texts().concat();
-        let id = "VUID-VkGaussianCameraGAURAST-model-parameter";
+        let id = "VUID-VkGaussianCameraGAURAST-model-90079";
         assert!(messages.contains(id), "{messages:?}");
     }
 }

@@ -41,7 +41,7 @@ mod target;
 
 pub use device_scene::DeviceScene;
 pub use error::{During, RenderError};
-pub use modes::{Antialiasing, Geometry, Order, Precision};
+pub use modes::{Antialiasing, CutOff, Geometry, Order, Precision};
 pub use query::Counter;
 pub use renderer::{Frame, Renderer};
 pub use settings::Settings;

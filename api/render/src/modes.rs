@@ -1,8 +1,8 @@
 //! Modes of the pipeline that change the picture, not the cost.
 
 use gaurast::vk::{
-    GaussianAntialiasingGAURAST, GaussianGeometryGAURAST, GaussianOrderGAURAST,
-    GaussianPrecisionGAURAST,
+    GaussianAntialiasingGAURAST, GaussianCutOffGAURAST, GaussianGeometryGAURAST,
+    GaussianOrderGAURAST, GaussianPrecisionGAURAST,
 };
 use serde::{Deserialize, Serialize};
 
@@ -29,7 +29,33 @@ impl Order {
     }
 }
 
-/// The shape of Gaussians in space.
+/// The shape outside which a Gaussian does not contribute, of a number of standard deviations.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum CutOff {
+    /// There is none: they contribute wherever their alpha reaches its floor.
+    #[default]
+    None,
+    /// The ellipse, as glTF's extension has it.
+    Ellipse,
+    /// The tiles of 16x16 pixels that a square touches, as 3DGS has them.
+    TileSquare,
+    /// The tiles that a rectangle touches, as gsplat has them.
+    TileRectangle,
+}
+
+impl CutOff {
+    /// As the pipeline is told.
+    pub(crate) fn raw(self) -> GaussianCutOffGAURAST {
+        match self {
+            Self::None => GaussianCutOffGAURAST::NONE,
+            Self::Ellipse => GaussianCutOffGAURAST::ELLIPSE,
+            Self::TileSquare => GaussianCutOffGAURAST::TILE_SQUARE,
+            Self::TileRectangle => GaussianCutOffGAURAST::TILE_RECTANGLE,
+        }
+    }
+}
+
+/// What Gaussians are in space.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Geometry {
     /// Volumes with three axes, as in 3DGS.

@@ -6,7 +6,7 @@ use ash::vk;
 use gaurast::vk::{
     GaussianAttributeLocationsGAURAST, GaussianResolveInputLocationsGAURAST,
     PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST, PipelineGaussianApproximationStateCreateInfoGAURAST,
-    PipelineGaussianStateCreateInfoGAURAST,
+    PipelineGaussianFootprintStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 
 use crate::device::Device;
@@ -82,6 +82,7 @@ impl GaussianPipeline {
         let mut gaussian = PipelineGaussianStateCreateInfoGAURAST::default()
             .spherical_harmonics_degree(settings.sh_degree)
             .alpha_floor(settings.alpha_floor)
+            .alpha_ceiling(settings.alpha_ceiling)
             .transmittance_floor(settings.transmittance_floor)
             .order(settings.order.raw())
             .geometry(settings.geometry.raw())
@@ -106,6 +107,10 @@ impl GaussianPipeline {
         let mut approximation = PipelineGaussianApproximationStateCreateInfoGAURAST::default()
             .exponential_error(settings.exponential_error)
             .contribution_budget(settings.contribution_budget);
+        let mut footprint = PipelineGaussianFootprintStateCreateInfoGAURAST::default()
+            .cut_off(settings.cut_off.raw())
+            .cut_off_deviations(settings.cut_off_deviations)
+            .compensation_floor(settings.compensation_floor);
         let create_info = vk::GraphicsPipelineCreateInfo::default()
             .stages(&stages)
             .vertex_input_state(&vertex_input)
@@ -118,6 +123,7 @@ impl GaussianPipeline {
             .layout(layout)
             .push_next(&mut gaussian)
             .push_next(&mut approximation)
+            .push_next(&mut footprint)
             .push_next(&mut rendering);
         // SAFETY: the structures are valid and live until the call returns.
         let created = unsafe {

@@ -5,7 +5,7 @@ use gaurast_scene::{Camera, MAX_SH_DEGREE};
 use serde::{Deserialize, Serialize};
 
 use crate::error::RenderError;
-use crate::modes::{Antialiasing, Geometry, Order, Precision};
+use crate::modes::{Antialiasing, CutOff, Geometry, Order, Precision};
 
 /// The pipeline's settings that affect the picture or its cost.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -15,7 +15,9 @@ pub struct Settings {
     pub sh_degree: u32,
     /// The least alpha with which a Gaussian contributes to a pixel.
     pub alpha_floor: f32,
-    /// The transmittance below which no Gaussian may take a pixel: the pixel is finished before.
+    /// Alpha is at most this.
+    pub alpha_ceiling: f32,
+    /// A pixel is finished before its transmittance would fall below this.
     pub transmittance_floor: f32,
     /// The key by which Gaussians are sorted.
     pub order: Order,
@@ -29,7 +31,13 @@ pub struct Settings {
     pub contribution_budget: f32,
     /// The treatment of Gaussians that are smaller than a pixel.
     pub antialiasing: Antialiasing,
-    /// True to write depths, too: see [`Frame::depth`](crate::Frame::depth).
+    /// The least ratio of determinants that compensated opacity is the root of.
+    pub compensation_floor: f32,
+    /// The shape outside which Gaussians do not contribute.
+    pub cut_off: CutOff,
+    /// The size of that shape in standard deviations.
+    pub cut_off_deviations: f32,
+    /// Keep depths, too: see [`Frame::depth`](crate::Frame::depth).
     pub depth: bool,
 }
 
@@ -39,6 +47,7 @@ impl Default for Settings {
         Self {
             sh_degree: MAX_SH_DEGREE,
             alpha_floor: 1.0 / 255.0,
+            alpha_ceiling: 0.99,
             transmittance_floor: 1e-4,
             order: Order::Depth,
             geometry: Geometry::Volume,
@@ -46,6 +55,9 @@ impl Default for Settings {
             exponential_error: 0.0,
             contribution_budget: 0.0,
             antialiasing: Antialiasing::Dilate,
+            compensation_floor: 0.0,
+            cut_off: CutOff::None,
+            cut_off_deviations: 3.0,
             depth: false,
         }
     }
@@ -82,6 +94,10 @@ impl Settings {
             (
                 half && panorama,
                 "panoramas are not drawn in binary16 (fp16)",
+            ),
+            (
+                self.cut_off != CutOff::None && (surfels || half),
+                "cut-offs, and so other renderers' pictures, are of volumes (3d) in binary32 (fp32)",
             ),
             (self.depth && half, "depths are not kept in binary16 (fp16)"),
             (

@@ -1,11 +1,13 @@
-//! Writes the files of the driver's own extension in `api/` from its fragment of the registry: the Rust of `gaurast`,
-//! the C header, and the C names with their Rust values, by which a test compares the two.
+//! Writes the driver's own extension as `api/` has it, from the extension's fragment of the registry: the Rust of
+//! `gaurast`, the C header, the names in C with their values in Rust, by which a test holds one against the other, and the
+//! valid usage that the registry implies.
 //!
 //! A structure has the `Default` that is written by hand among the sources of `gaurast`, or else that of each member.
 
 mod comment;
 mod extension;
 mod header;
+mod implicit;
 mod names;
 mod rust;
 
@@ -46,6 +48,10 @@ pub(crate) fn generate(root: &Path, fragment: &Path) -> Result<Vec<File>, Error>
         File {
             path: "api/include/vulkan_gaurast.h",
             text: header::write(&extension),
+        },
+        File {
+            path: "api/spec/implicit_valid_usage.adoc",
+            text: implicit::write(&extension),
         },
     ])
 }

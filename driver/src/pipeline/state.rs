@@ -12,7 +12,8 @@ use crate::registry::features::SUPPORTED;
 use crate::shader_module::ShaderStage;
 use ash::vk;
 use gaurast::vk::{
-    PipelineGaussianApproximationStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+    PipelineGaussianApproximationStateCreateInfoGAURAST,
+    PipelineGaussianFootprintStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 use simdevice::Format;
 use simdevice::state::gaussian::GaussianState;
@@ -42,6 +43,8 @@ pub(crate) struct GraphicsState<'a> {
     pub(crate) gaussian: Option<PipelineGaussianStateCreateInfoGAURAST<'a>>,
     /// The extension's structure of approximations.
     pub(crate) approximation: Option<PipelineGaussianApproximationStateCreateInfoGAURAST<'a>>,
+    /// The extension's structure of footprints.
+    pub(crate) footprint: Option<PipelineGaussianFootprintStateCreateInfoGAURAST<'a>>,
 }
 
 /// The vertex input and input assembly state.
@@ -163,6 +166,10 @@ impl<'a> GraphicsState<'a> {
                     .copied();
             gathered.approximation = valid::find_in_chain::<
                 PipelineGaussianApproximationStateCreateInfoGAURAST,
+            >(info.p_next)
+            .copied();
+            gathered.footprint = valid::find_in_chain::<
+                PipelineGaussianFootprintStateCreateInfoGAURAST,
             >(info.p_next)
             .copied();
             if let Some(state) = valid::optional(info.p_dynamic_state) {

@@ -498,6 +498,12 @@ pub(crate) struct Features {
     pub(crate) spherical_harmonics_buffer: bool,
     /// `gaussianDynamicState`.
     pub(crate) gaussian_dynamic_state: bool,
+    /// `resolveGaussianIndices`.
+    pub(crate) resolve_gaussian_indices: bool,
+    /// `gaussianCutOff`.
+    pub(crate) gaussian_cut_off: bool,
+    /// `opacityCompensationFloor`.
+    pub(crate) opacity_compensation_floor: bool,
     /// `performanceCounterQueryPools`.
     pub(crate) performance_counter_query_pools: bool,
     /// `performanceCounterMultipleQueryPools`.
@@ -692,6 +698,9 @@ pub(crate) const SUPPORTED: Features = Features {
     attribute_activation: true,
     spherical_harmonics_buffer: true,
     gaussian_dynamic_state: true,
+    resolve_gaussian_indices: true,
+    gaussian_cut_off: true,
+    opacity_compensation_floor: true,
     performance_counter_query_pools: true,
     workgroup_memory_explicit_layout: true,
     workgroup_memory_explicit_layout_scalar_block_layout: true,
@@ -947,6 +956,9 @@ impl Features {
         attribute_activation: false,
         spherical_harmonics_buffer: false,
         gaussian_dynamic_state: false,
+        resolve_gaussian_indices: false,
+        gaussian_cut_off: false,
+        opacity_compensation_floor: false,
         performance_counter_query_pools: false,
         performance_counter_multiple_query_pools: false,
         workgroup_memory_explicit_layout: false,
@@ -956,7 +968,7 @@ impl Features {
     };
 
     /// The features by their names in Rust.
-    pub(crate) fn list(&self) -> [(&'static str, bool); 250] {
+    pub(crate) fn list(&self) -> [(&'static str, bool); 223] {
         [
             ("robust_buffer_access", self.robust_buffer_access),
             ("full_draw_index_uint32", self.full_draw_index_uint32),
@@ -1586,6 +1598,12 @@ impl Features {
                 self.spherical_harmonics_buffer,
             ),
             ("gaussian_dynamic_state", self.gaussian_dynamic_state),
+            ("resolve_gaussian_indices", self.resolve_gaussian_indices),
+            ("gaussian_cut_off", self.gaussian_cut_off),
+            (
+                "opacity_compensation_floor",
+                self.opacity_compensation_floor,
+            ),
             (
                 "performance_counter_query_pools",
                 self.performance_counter_query_pools,
@@ -2295,6 +2313,9 @@ impl Features {
             out.attribute_activation = self.attribute_activation.into();
             out.spherical_harmonics_buffer = self.spherical_harmonics_buffer.into();
             out.gaussian_dynamic_state = self.gaussian_dynamic_state.into();
+            out.resolve_gaussian_indices = self.resolve_gaussian_indices.into();
+            out.gaussian_cut_off = self.gaussian_cut_off.into();
+            out.opacity_compensation_floor = self.opacity_compensation_floor.into();
         }
         if let Some(out) = structure.cast::<vk::PhysicalDevicePerformanceQueryFeaturesKHR<'_>>() {
             out.performance_counter_query_pools = self.performance_counter_query_pools.into();
@@ -2937,6 +2958,9 @@ impl Features {
             self.attribute_activation |= requested.attribute_activation != vk::FALSE;
             self.spherical_harmonics_buffer |= requested.spherical_harmonics_buffer != vk::FALSE;
             self.gaussian_dynamic_state |= requested.gaussian_dynamic_state != vk::FALSE;
+            self.resolve_gaussian_indices |= requested.resolve_gaussian_indices != vk::FALSE;
+            self.gaussian_cut_off |= requested.gaussian_cut_off != vk::FALSE;
+            self.opacity_compensation_floor |= requested.opacity_compensation_floor != vk::FALSE;
         }
         if let Some(requested) =
             valid::cast::<vk::PhysicalDevicePerformanceQueryFeaturesKHR<'_>>(structure)

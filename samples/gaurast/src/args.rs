@@ -8,7 +8,9 @@ use gaurast_picture::{Background, DEFAULT_QUALITY, Size};
 use gaurast_scene::{MAX_SH_DEGREE, Transform};
 use glam::{DQuat, DVec3};
 
-/// The text at the end of every command's help.
+use crate::renderers::OtherRenderer;
+
+/// What every command's help ends with.
 pub const EXIT_CODES: &str = "Exit codes: 0 done, 1 it failed and one sentence on stderr says why, 2 the command line means \
     nothing.";
 
@@ -210,7 +212,13 @@ pub struct ModeArguments {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(..=i64::from(MAX_SH_DEGREE)))]
     pub sh_degree: Option<u32>,
 
-    /// The order in which Gaussians are sorted
+    /// Draw the picture that another renderer would: its cut-off, near plane, thresholds and order
+    ///
+    /// --order and --near overrule it. With --antialiasing compensated it is that renderer's compensated mode.
+    #[arg(long = "as", value_name = "RENDERER", value_enum)]
+    pub renderer: Option<OtherRenderer>,
+
+    /// What the Gaussians are sorted by
     #[arg(long, value_enum, default_value_t)]
     pub order: Order,
 
@@ -238,7 +246,19 @@ pub struct ModeArguments {
     pub contribution_budget: f32,
 }
 
-/// The output arguments.
+impl ModeArguments {
+    /// Camera options, with the near plane of the renderer that is followed, unless they say another one.
+    pub fn cameras(&self, arguments: &CameraArguments) -> CameraArguments {
+        CameraArguments {
+            near: arguments
+                .near
+                .or(self.renderer.and_then(OtherRenderer::near)),
+            ..arguments.clone()
+        }
+    }
+}
+
+/// What is written, and where.
 #[derive(Args, Default)]
 #[command(next_help_heading = "Output")]
 pub struct OutputArguments {

@@ -246,7 +246,7 @@ fn draw(arguments: &CompareArguments, size: [u32; 2]) -> Result<Picture, Error> 
     })?;
     let camera = CameraArguments {
         size: Some(arguments.camera.size.unwrap_or(Size(size))),
-        ..arguments.camera.clone()
+        ..arguments.modes.cameras(&arguments.camera)
     };
     let known = cameras::read(&camera, &source)?;
     let (scene, _) = source.load(progress)?;

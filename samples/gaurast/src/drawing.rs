@@ -12,6 +12,7 @@ use crate::cameras::View;
 use crate::limits;
 use crate::outputs::{Finished, Outputs, WriteError};
 use crate::progress::Progress;
+use crate::renderers::OtherRenderer;
 
 /// A failure of drawing. Displayed as one sentence.
 #[derive(Debug, Error)]
@@ -39,6 +40,9 @@ pub fn settings(modes: &ModeArguments, scene: &Scene) -> Settings {
         Antialiasing::Compensated => true,
     };
     let order = match modes.order {
+        Order::Auto if modes.renderer.is_some() => modes
+            .renderer
+            .map_or_else(Default::default, OtherRenderer::order),
         Order::Auto if metadata_order(scene) == SortOrder::Distance => {
             gaurast_render::Order::Distance
         }
@@ -46,7 +50,7 @@ pub fn settings(modes: &ModeArguments, scene: &Scene) -> Settings {
         Order::Distance => gaurast_render::Order::Distance,
         Order::PerPixel => gaurast_render::Order::PerPixel,
     };
-    Settings {
+    let settings = Settings {
         sh_degree: modes.sh_degree.unwrap_or(MAX_SH_DEGREE),
         order,
         geometry: if surfels {
@@ -63,6 +67,10 @@ pub fn settings(modes: &ModeArguments, scene: &Scene) -> Settings {
         exponential_error: modes.exponential_error,
         contribution_budget: modes.contribution_budget,
         ..Settings::default()
+    };
+    match modes.renderer {
+        Some(renderer) => renderer.settings(settings),
+        None => settings,
     }
 }
 

@@ -13,6 +13,7 @@ mod logger;
 mod outputs;
 mod progress;
 mod render;
+mod renderers;
 mod report;
 mod sheet;
 mod simulate;

@@ -61,11 +61,12 @@ pub fn run(arguments: &RenderArguments) -> Result<(), Error> {
     let (scene, loading) = source.load(progress)?;
     let outputs = outputs.with_colors(drawing::has_linear_colors(&scene));
     let garden = source.is_garden();
+    let camera = arguments.modes.cameras(&arguments.camera);
     let Views {
         views,
         mut notes,
         framing,
-    } = cameras::of_scene(known, &arguments.camera, &scene, garden)?;
+    } = cameras::of_scene(known, &camera, &scene, garden)?;
     if arguments.camera.frame {
         return print_keyframes(&cameras::keyframes(&views, &scene)).map_err(Error::Report);
     }

@@ -1,6 +1,7 @@
 //! Cameras: the constants that all Gaussians of a view share, the projection of a point to the picture, and the
 //! projection's Jacobian.
 
+use super::cut_off::TileCutOff;
 use super::depth::CenterDepth;
 use super::footprint::Visible;
 #[cfg(feature = "mistakes")]
@@ -41,6 +42,8 @@ pub(crate) struct ViewConstants {
     pub(super) far: f32,
     pub(super) low_pass: f64,
     pub(super) compensated: bool,
+    /// The least ratio of determinants that compensation takes the root of.
+    pub(super) compensation_floor: f64,
     pub(super) alpha_floor: f64,
     pub(super) log2_floor: f64,
     pub(super) sh_degree: u32,
@@ -48,6 +51,10 @@ pub(crate) struct ViewConstants {
     pub(super) optimizations: Optimizations,
     /// The map from depth variables to depths, if the draw needs depths.
     pub(super) depth: Option<CenterDepth>,
+    /// Whether identities are kept.
+    pub(super) is_tracked: bool,
+    /// The cut-off by which tiles are left out.
+    pub(super) list_cut_off: Option<TileCutOff>,
 }
 
 impl ViewConstants {
@@ -92,11 +99,14 @@ impl ViewConstants {
             far: camera.far_plane,
             low_pass: f64::from(state.low_pass_variance),
             compensated: state.opacity_compensated,
+            compensation_floor: state.footprint.compensation_floor.into(),
             alpha_floor: state.alpha_floor.into(),
             log2_floor: f64::from(state.alpha_floor).log2().max(LEAST_LOG2_ALPHA),
             sh_degree: state.sh_degree,
             visible,
             depth,
+            is_tracked: false,
+            list_cut_off: list_cut_off(state, camera, viewport),
             optimizations,
         }
     }
@@ -113,8 +123,18 @@ impl ViewConstants {
     }
 }
 
-/// The number of pixels after which a camera's picture repeats horizontally: that of a full turn for a panorama, `None`
-/// for other cameras.
+/// The cut-off that lists of tiles see to alone: one in the device's own tiles, of pictures that do not repeat.
+pub(super) fn list_cut_off(
+    state: &GaussianState,
+    camera: &Camera,
+    viewport: &Viewport,
+) -> Option<TileCutOff> {
+    let corner = [viewport.x, viewport.y].map(f64::from);
+    TileCutOff::of(state, corner)
+        .filter(|cut_off| cut_off.is_in_device_tiles() && period(camera).is_none())
+}
+
+/// After how many pixels a camera's picture repeats to the right and to the left, if it does.
 pub(super) fn period(camera: &Camera) -> Option<f64> {
     #[cfg(feature = "mistakes")]
     if Mistake::PanoramaEnds.is_made() {

@@ -11,11 +11,13 @@ pub mod caches;
 mod camera;
 pub(crate) mod cluster_cache;
 mod clusters;
+pub(crate) mod cut_off;
 pub(crate) mod depth;
 mod depth_order;
 pub(crate) mod footprint;
 mod frustum;
 mod group_tasks;
+pub(crate) mod identity;
 mod instances;
 mod lanes;
 mod occlusion;
@@ -169,14 +171,17 @@ fn preprocess_set(
 ) -> Result<Preprocessed, SortError> {
     let begin = &set.begin;
     let optimizations = runtime.config().optimizations;
-    let constants = ViewConstants::new(
-        &begin.state,
-        &begin.camera,
-        &begin.viewport,
-        Visible::from(set.bounds),
-        set.depth,
-        optimizations,
-    );
+    let constants = ViewConstants {
+        is_tracked: set.is_tracked(),
+        ..ViewConstants::new(
+            &begin.state,
+            &begin.camera,
+            &begin.viewport,
+            Visible::from(set.bounds),
+            set.depth,
+            optimizations,
+        )
+    };
     let preprocessor = Preprocessor {
         runtime,
         constants: &constants,

@@ -16,7 +16,7 @@ use super::sort;
 use super::splat::{ProjectedGroup, Splat};
 use crate::limits::TILE_SIZE;
 use crate::state::gaussian::{
-    CameraModel, GaussianGeometry, GaussianOrder, GaussianPrecision, GaussianState,
+    CameraModel, GaussianCutOff, GaussianGeometry, GaussianOrder, GaussianPrecision, GaussianState,
 };
 use crate::state::{DepthStencil, Rect};
 use crate::stats::counters::{Counter, Counters};
@@ -123,6 +123,8 @@ fn may_hide(set: &GaussianSet, preprocessor: &Preprocessor<'_>) -> bool {
         && state.order == GaussianOrder::ViewDepth
         && state.geometry == GaussianGeometry::Volume
         && state.precision == GaussianPrecision::Float32
+        // What is cut off takes no light there.
+        && state.footprint.cut_off == GaussianCutOff::None
         && least_light(state) > 0.0
         // With depth or stencil tests an occluder may be rejected.
         && state.depth_stencil == DepthStencil::default()

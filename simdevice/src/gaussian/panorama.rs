@@ -77,6 +77,7 @@ pub(super) fn copy_last(
         to.splats.push(splat);
         // A copy has the same depth along a pixel's ray.
         to.ray_depths.extend(out.ray_depths.last().copied());
+        to.identities.extend(out.identities.last().copied());
         to.keys.push(key);
         to.reaches.push(reach);
     }

@@ -10,6 +10,7 @@ use super::attributes::{Attributes, CoefficientReader, Fetcher, Group, Harmonics
 use super::camera::{LN_2, ViewConstants};
 use super::clusters::Cluster;
 use super::frustum::Frustum;
+use super::identity::Identity;
 use super::instances::{Matrices, cofactors, dot};
 use super::lanes::{Bits, F32_LANES, GROUP, GroupF64, log2};
 use super::ray_depth::RayDepth;
@@ -350,7 +351,11 @@ pub(super) fn shape<S: Simd>(
     let determinant = area2 + low_pass * (xx + yy) + low_pass * low_pass;
     store(determinant, &mut flat.determinant);
     if view.compensated {
-        o *= (area2 / determinant).sqrt();
+        let mut ratio = area2 / determinant;
+        if view.compensation_floor > 0.0 {
+            ratio = ratio.max(number(view.compensation_floor));
+        }
+        o *= ratio.sqrt();
     }
     let log2_opacity = log2(simd, o);
     store(log2_opacity, &mut flat.log2_opacity);
@@ -604,6 +609,13 @@ fn append(
     if view.order == GaussianOrder::PerPixel {
         let depths = lanes.iter().map(|one| ray_depth(view, one.at, scratch));
         out.ray_depths.extend(depths);
+    }
+    if view.is_tracked {
+        let identities = lanes.iter().map(|one| Identity {
+            z: scratch.depth[one.at] as f32,
+            sequence: sequences[one.at],
+        });
+        out.identities.extend(identities);
     }
 }
 

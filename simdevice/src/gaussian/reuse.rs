@@ -36,6 +36,8 @@ pub(super) struct Key {
     depth: Option<Format>,
     /// True if a fragment program computes colours. Then nothing is hidden by others.
     is_resolved: bool,
+    /// Whether it reads which Gaussians there are.
+    is_tracked: bool,
 }
 
 #[derive(Debug)]
@@ -89,6 +91,7 @@ impl Key {
             layer: set.layer,
             depth: set.depth.as_ref().map(|_| set.depth_format),
             is_resolved: set.resolve.is_some(),
+            is_tracked: set.is_tracked(),
         })
     }
 
@@ -97,7 +100,7 @@ impl Key {
             a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.is_same(b))
         };
         let view = |key: &Self| {
-            let depths = (key.depth, key.is_resolved);
+            let depths = (key.depth, key.is_resolved, key.is_tracked);
             let place = (key.bounds, key.layer);
             (key.camera, key.viewport, place, depths)
         };

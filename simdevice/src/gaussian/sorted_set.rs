@@ -1,7 +1,8 @@
 //! Sorted sets: the result of preprocessing, sorting and binning Gaussians, and the input of the tile engine.
 
-use super::camera::period;
+use super::camera::{list_cut_off, period};
 use super::depth::DepthTrend;
+use super::identity::{Identity, Origins};
 use super::ray_depth::{PixelRays, RayDepth, RayDepths};
 use super::set::GaussianSet;
 use super::splat::{ProjectedGroup, Splat};
@@ -11,7 +12,7 @@ use crate::format::depth::DepthEncoding;
 use crate::packet::GaussianFragmentStage;
 use crate::runtime::Runtime;
 use crate::state::Rect;
-use crate::state::gaussian::{GaussianOrder, GaussianState};
+use crate::state::gaussian::{Camera, GaussianOrder, GaussianState};
 use crate::stats::counters::Counters;
 use crate::stats::optimizations::Optimizations;
 use crate::stats::recorder::DrawRecord;
@@ -32,7 +33,9 @@ pub(crate) struct SortedSet {
     pub(super) surfels: Option<Vec<Vec<Surfel>>>,
     /// The coefficients of depths along rays by group, in the order of the splats, if the order is per pixel.
     pub(super) ray_depths: Option<Vec<Vec<RayDepth>>>,
-    /// The counts of the set's Gaussians by what became of them.
+    /// By group, as the splats, if a fragment program reads which they are.
+    pub(super) identities: Option<Vec<Vec<Identity>>>,
+    /// What became of the set's Gaussians.
     pub(super) counters: Counters,
 }
 
@@ -58,7 +61,15 @@ pub struct BinnedDraw {
     pub(crate) half_period: f64,
     /// The pixels' rays.
     rays: PixelRays,
-    /// The record to which the work of its tiles is added, if there is a recorder.
+    /// The camera that it is seen by, if the device projects.
+    pub(crate) camera: Camera,
+    /// The upper left corner of the viewport's area, in pixels.
+    pub(crate) viewport_corner: [f64; 2],
+    /// Whether lists of tiles see to the cut-off.
+    pub(crate) are_lists_cut: bool,
+    /// The draws of the set, if a fragment program reads which Gaussians there are.
+    pub(crate) origins: Option<Origins>,
+    /// Where the work of its tiles goes, if anybody wants to know.
     pub(crate) record: Option<Arc<DrawRecord>>,
 }
 
@@ -71,13 +82,20 @@ impl SortedSet {
         groups
             .into_par_iter()
             .with_min_len(LEAST_GROUPS)
-            .map(|group| (group.splats, (group.surfels, group.ray_depths)))
+            .map(|group| {
+                let more = (group.surfels, group.ray_depths, group.identities);
+                (group.splats, more)
+            })
             .unzip_into_vecs(&mut splats, &mut others);
         let surfels = others
             .iter_mut()
             .map(|others| std::mem::take(&mut others.0));
         let surfels = set.is_flat().then(|| host::collect(surfels));
         let is_per_pixel = set.begin.state.order == GaussianOrder::PerPixel;
+        let identities = others
+            .iter_mut()
+            .map(|others| std::mem::take(&mut others.2));
+        let identities = set.is_tracked().then(|| host::collect(identities));
         let depths = others.into_iter().map(|others| others.1);
         let ray_depths = is_per_pixel.then(|| host::collect(depths));
         Self {
@@ -85,6 +103,7 @@ impl SortedSet {
             tiles,
             surfels,
             ray_depths,
+            identities,
             counters: Counters::default(),
         }
     }
@@ -96,8 +115,11 @@ impl SortedSet {
         let depths = depths.map(|group| size_of_val(&**group) as u64);
         let surfels = self.surfels.iter().flatten();
         let surfels = surfels.map(|group| size_of_val(&**group) as u64);
+        let identities = self.identities.iter().flatten();
+        let identities = identities.map(|group| size_of_val(&**group) as u64);
         let lists = self.tiles.memory_bytes();
-        splats.sum::<u64>() + depths.sum::<u64>() + surfels.sum::<u64>() + lists
+        let others = depths.sum::<u64>() + surfels.sum::<u64>() + identities.sum::<u64>();
+        splats.sum::<u64>() + others + lists
     }
 }
 
@@ -109,8 +131,13 @@ impl BinnedDraw {
         record: Option<Arc<DrawRecord>>,
         runtime: &Runtime,
     ) -> Self {
+        let origins = set.is_tracked().then(|| Origins::new(&set));
         let begin = set.begin;
         Self {
+            origins,
+            camera: begin.camera,
+            are_lists_cut: list_cut_off(&begin.state, &begin.camera, &begin.viewport).is_some(),
+            viewport_corner: [begin.viewport.x, begin.viewport.y].map(f64::from),
             depth_trend: match (set.depth, begin.state.order) {
                 // The sort keys of a vertex program are independent of its depths.
                 (Some(depth), GaussianOrder::ViewDepth) if set.draws.is_empty() => depth.trend(),
@@ -139,7 +166,12 @@ impl BinnedDraw {
         self.sorted.surfels.as_deref()
     }
 
-    /// The inputs of the per-pixel order, if that is the order.
+    /// Which the splats are, if a fragment program reads that.
+    pub(crate) fn identities(&self) -> Option<&[Vec<Identity>]> {
+        self.sorted.identities.as_deref()
+    }
+
+    /// What pixels sort by, if each does so for itself.
     pub(crate) fn ray_depths(&self) -> Option<RayDepths<'_>> {
         let of = self.sorted.ray_depths.as_ref()?;
         Some(RayDepths {

@@ -1,6 +1,7 @@
 //! Splats: projected Gaussians as the rasterizer's nine numbers, and the data that belong to them.
 
 use super::footprint::{TileFootprint, TileSpan};
+use super::identity::Identity;
 use super::lanes::GROUP;
 use super::ray_depth::RayDepth;
 use super::scratch::ScreenGaussians;
@@ -103,7 +104,9 @@ pub(crate) struct ProjectedGroup {
     pub ray_depths: Vec<RayDepth>,
     /// The disc of each, for 2D Gaussians.
     pub surfels: Vec<Surfel>,
-    /// The tile footprint of each.
+    /// Which each is, if a fragment program wants to know.
+    pub identities: Vec<Identity>,
+    /// The tiles of each.
     pub reaches: Vec<TileFootprint>,
     /// The spans of footprints that do not store them inline.
     pub spans: Vec<TileSpan>,

@@ -186,6 +186,9 @@ fn find_tiles_by<S: Simd>(
             reached.set_one(at, true);
         }
     });
+    if let Some(cut_off) = &view.list_cut_off {
+        cut_off.clip(scratch, &mut out.spans, &mut reached);
+    }
     scratch.reached.clear();
     reached.for_each(|at| scratch.reached.push(at));
     let off_screen = drawn.without(&reached).count();

@@ -4,6 +4,7 @@
 use super::camera::ViewConstants;
 use super::depth::CenterDepth;
 use super::footprint::Visible;
+use super::identity::Identity;
 use super::lanes::{Bits, GROUP, GroupF64, NO_GROUP_F64};
 use super::preprocess::shape;
 use super::scratch::Scratch;
@@ -213,7 +214,10 @@ impl Shading {
         };
         let half = [viewport.width, viewport.height].map(|size| 0.5 * f64::from(size));
         Self {
-            constants: ViewConstants::new(state, &camera, viewport, visible, None, optimizations),
+            constants: ViewConstants {
+                is_tracked: set.is_tracked(),
+                ..ViewConstants::new(state, &camera, viewport, visible, None, optimizations)
+            },
             half,
             middle: [
                 half[0] + f64::from(viewport.x),
@@ -357,6 +361,10 @@ impl Shading {
             let splat = Splat::new(&scratch.flat, at, kept.color[at], depth);
             out.splats.push(splat);
             out.reaches.push(scratch.reaches.get(at));
+            if constants.is_tracked {
+                let z = w[at] as f32;
+                out.identities.push(Identity { z, sequence });
+            }
         }
         let drawn = out.splats.len() as u64;
         out.counters.add(Counter::GaussiansDrawn, drawn);

@@ -173,6 +173,8 @@ impl Interface {
 pub struct GaussianFragmentProgram {
     pub(crate) stage: FragmentStage,
     pub(crate) reads_depth: bool,
+    /// Whether it reads which Gaussians there are, or depth variables.
+    pub(crate) is_tracking: bool,
 }
 
 impl GaussianFragmentProgram {
@@ -183,13 +185,22 @@ impl GaussianFragmentProgram {
     pub fn new(level: Level, programs: &FragmentPrograms) -> Result<Self, InvalidProgram> {
         let stage = FragmentStage::new(level, programs)?;
         let is_depth = |input: FragmentInput| match input {
-            FragmentInput::Varying { index, .. } => index >= resolve::EXPECTED_DEPTH,
+            FragmentInput::Varying { index, .. } => {
+                (resolve::EXPECTED_DEPTH..=resolve::MEDIAN_DEPTH).contains(&index)
+            }
             FragmentInput::FragCoord(axis) => axis == 2,
+            _ => false,
+        };
+        let is_tracked = |input: FragmentInput| match input {
+            FragmentInput::Varying { index, .. } => {
+                (resolve::EXPECTED_LINEAR_DEPTH..resolve::CAMERA).contains(&index)
+            }
             _ => false,
         };
         let inputs = &stage.interface.inputs;
         Ok(Self {
             reads_depth: inputs.iter().any(|&(_, input, _)| is_depth(input)),
+            is_tracking: inputs.iter().any(|&(_, input, _)| is_tracked(input)),
             stage,
         })
     }
@@ -197,5 +208,10 @@ impl GaussianFragmentProgram {
     /// True if the program reads a depth.
     pub fn reads_depth(&self) -> bool {
         self.reads_depth
+    }
+
+    /// Whether it reads which Gaussians there are, or depth variables.
+    pub fn is_tracking(&self) -> bool {
+        self.is_tracking
     }
 }

@@ -24,8 +24,20 @@ pub mod resolve {
     pub const ACCUMULATED: u32 = 0;
     /// The mean depth, weighted by contributions.
     pub const EXPECTED_DEPTH: u32 = 4;
-    /// The depth of the last Gaussian that contributed while the transmittance was at least a half.
+    /// The depth of the last Gaussian that contributed where half of the transmittance or more was left: the median.
     pub const MEDIAN_DEPTH: u32 = 5;
+    /// The mean depth variable, weighted by contributions.
+    pub const EXPECTED_LINEAR_DEPTH: u32 = 6;
+    /// The depth variable of the median.
+    pub const MEDIAN_LINEAR_DEPTH: u32 = 7;
+    /// The first of two: the vertex index and the instance index of the median.
+    pub const MEDIAN_GAUSSIAN: u32 = 8;
+    /// The first of two, of the first Gaussian that contributed.
+    pub const NEAREST_GAUSSIAN: u32 = 10;
+    /// The first of those that the camera is: [`CAMERA_LOCATIONS`] of four each.
+    pub const CAMERA: u32 = 12;
+    /// How many vectors the camera is.
+    pub const CAMERA_LOCATIONS: u32 = 6;
 }
 
 /// The programs of a [`DrawPipeline`](crate::program::vertex::DrawPipeline). Slots of programs are indices into the

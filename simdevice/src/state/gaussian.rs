@@ -112,7 +112,34 @@ pub struct GaussianApproximation {
     pub contribution_budget: f32,
 }
 
-/// The state of a Gaussian draw that its pipeline fixes. The extension's text defines each value.
+/// The shape outside which a Gaussian does not contribute, whatever its alpha. Tiles are 16x16 pixels, from the upper left
+/// corner of the viewport's area on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum GaussianCutOff {
+    /// There is none.
+    #[default]
+    None,
+    /// The ellipse of a Mahalanobis distance.
+    Ellipse,
+    /// The tiles that a square touches, whose half side is the longer standard deviation, rounded up to whole pixels.
+    TileSquare,
+    /// The tiles that a rectangle touches, whose half sides are standard deviations along x and y, rounded up so.
+    TileRectangle,
+}
+
+/// The pixels that Gaussians may reach, and what opacity they have at least. By default they reach all where their alpha
+/// does.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct GaussianFootprint {
+    /// The shape outside which they do not contribute.
+    pub cut_off: GaussianCutOff,
+    /// Its size in standard deviations.
+    pub deviations: f32,
+    /// The least ratio of determinants that compensation takes the root of, 0 to 1.
+    pub compensation_floor: f32,
+}
+
+/// The state of a Gaussian draw that its pipeline fixes. See the extension for each value's meaning.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GaussianState {
     /// The spherical harmonics degree that is evaluated, 0 to 4.
@@ -135,7 +162,9 @@ pub struct GaussianState {
     pub alpha_ceiling: f32,
     /// The least transmittance of a pixel. A pixel is finished before its transmittance would fall below it.
     pub transmittance_floor: f32,
-    /// The errors that are permitted.
+    /// The pixels that they may reach.
+    pub footprint: GaussianFootprint,
+    /// How far pixels may be from all that.
     pub approximation: GaussianApproximation,
     /// Whether depths before the viewport, and those of clip space, are from -1, not from 0, to 1.
     pub negative_one_to_one: bool,
@@ -166,6 +195,7 @@ impl Default for GaussianState {
             alpha_floor: 1.0 / 255.0,
             alpha_ceiling: 0.99,
             transmittance_floor: 1e-4,
+            footprint: GaussianFootprint::default(),
             approximation: GaussianApproximation::default(),
             negative_one_to_one: false,
             sample_mask: u32::MAX,

@@ -3,9 +3,10 @@
 use ash::vk;
 use gaurast::vk::{
     GaussianAntialiasingGAURAST as Antialiasing, GaussianCameraGAURAST,
-    GaussianCameraModelGAURAST as Model, GaussianGeometryGAURAST as Geometry,
-    GaussianLinearizationGAURAST as Linearization, GaussianOrderGAURAST as Order,
-    GaussianPrecisionGAURAST as Precision, PipelineGaussianStateCreateInfoGAURAST,
+    GaussianCameraModelGAURAST as Model, GaussianCutOffGAURAST as CutOff,
+    GaussianGeometryGAURAST as Geometry, GaussianLinearizationGAURAST as Linearization,
+    GaussianOrderGAURAST as Order, GaussianPrecisionGAURAST as Precision,
+    PipelineGaussianFootprintStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 use gaurast_oracle::oracle::{OracleDepthFormat, OracleInstance};
 use gaurast_oracle::scenes::{self, SceneBuffers};
@@ -14,6 +15,9 @@ use crate::device::Device;
 
 /// The Gaussian state of a pipeline.
 pub type State = PipelineGaussianStateCreateInfoGAURAST<'static>;
+
+/// The pixels that Gaussians may reach.
+pub type Footprint = PipelineGaussianFootprintStateCreateInfoGAURAST<'static>;
 
 /// A camera.
 pub type Camera = GaussianCameraGAURAST<'static>;
@@ -34,6 +38,10 @@ pub struct Draw {
     pub state: State,
     /// `exponentialError` and `contributionBudget`, if that structure is chained.
     pub approximation: Option<[f32; 2]>,
+    /// The footprint, if the structure is chained.
+    pub footprint: Option<Footprint>,
+    /// The inputs that a resolve shader shows as colours, if there is one.
+    pub shown: Option<Shown>,
     /// The camera.
     pub camera: Camera,
     /// True if the camera comes from a uniform buffer.
@@ -70,7 +78,35 @@ pub struct Draw {
     pub sample_mask: u32,
 }
 
-/// A draw command or the end of a set.
+/// Inputs of a resolve shader, which it writes as a colour.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shown {
+    /// The accumulated colour.
+    Accumulated,
+    /// The expected and the median depth, then 0 and 1.
+    Depths,
+    /// The expected and the median depth variable, then 0 and 1.
+    LinearDepths,
+    /// Vertex and instance of the median, and of the nearest.
+    Gaussians,
+    /// The vector of the camera at a location from 0 to 5.
+    Camera(u32),
+}
+
+impl Shown {
+    /// The number by which the shader knows it.
+    pub(crate) fn number(self) -> u32 {
+        match self {
+            Self::Accumulated => 0,
+            Self::Depths => 1,
+            Self::LinearDepths => 2,
+            Self::Gaussians => 3,
+            Self::Camera(location) => 4 + location,
+        }
+    }
+}
+
+/// A command.
 #[derive(Clone, Copy, Debug)]
 pub enum Call {
     /// `vkCmdDraw`.
@@ -197,6 +233,8 @@ impl Draw {
             scene,
             state: State::default(),
             approximation: None,
+            footprint: None,
+            shown: None,
             camera: scenes::camera(SIZE[0], SIZE[1]).to_vulkan(),
             camera_in_buffer: false,
             instances: None,
@@ -227,7 +265,15 @@ impl Draw {
         self
     }
 
-    /// The same with another camera.
+    /// The same with another footprint.
+    #[must_use]
+    pub fn within(mut self, cut_off: CutOff, deviations: f32) -> Self {
+        let footprint = self.footprint.unwrap_or_default();
+        self.footprint = Some(footprint.cut_off(cut_off).cut_off_deviations(deviations));
+        self
+    }
+
+    /// The same through another camera.
     #[must_use]
     pub fn seen_by(mut self, camera: Camera) -> Self {
         self.camera = camera;
@@ -253,6 +299,7 @@ impl Draw {
         let any = self
             .approximation
             .is_some_and(|numbers| numbers != [0.0; 2]);
+        let footprint = self.footprint.unwrap_or_default();
         let needs = [
             (
                 state.order == Order::RADIAL_DISTANCE,
@@ -327,6 +374,26 @@ impl Draw {
                 "gaussianMultisample",
             ),
             (any, has.gaussian_approximation, "gaussianApproximation"),
+            (
+                footprint.cut_off != CutOff::NONE,
+                has.gaussian_cut_off,
+                "gaussianCutOff",
+            ),
+            (
+                footprint.compensation_floor != 0.0,
+                has.opacity_compensation_floor,
+                "opacityCompensationFloor",
+            ),
+            (
+                self.shown.is_some(),
+                has.resolve_fragment_shader,
+                "resolveFragmentShader",
+            ),
+            (
+                self.shown.is_some(),
+                has.resolve_gaussian_indices,
+                "resolveGaussianIndices",
+            ),
         ];
         let lacks = needs
             .iter()

@@ -17,7 +17,7 @@ use crate::draw::{Blend, Call, ColorFormat, Draw};
 use crate::implementation::Picture;
 
 /// The distance from the envelope that the extension's text allows, per unit of the greatest colour above 1.
-const CONTRACT: f64 = 5e-6;
+pub(crate) const CONTRACT: f64 = 5e-6;
 
 /// The contents that the attachments may have after a draw.
 #[derive(Clone, Debug)]
@@ -60,7 +60,7 @@ pub fn stored_before(draw: &Draw) -> Stored {
 /// Computes the expected results of a draw.
 pub fn expected(draw: &Draw, before: &Stored) -> Expected {
     let pixels = (draw.size[0] * draw.size[1]) as usize;
-    let state = OracleState::from(&draw.state);
+    let state = oracle_state(draw);
     let camera = oracle_camera(draw);
     let mut color = Reference {
         width: draw.size[0],
@@ -164,9 +164,14 @@ impl Covered {
     }
 }
 
-/// The camera for the pixels of the viewport. A viewport with fractions of pixels is modelled exactly only if the
-/// camera clamps no slope.
-fn oracle_camera(draw: &Draw) -> OracleCamera {
+/// The state of a draw.
+pub(crate) fn oracle_state(draw: &Draw) -> OracleState {
+    OracleState::from(&draw.state).with_footprint(&draw.footprint.unwrap_or_default())
+}
+
+/// The camera of the pixels of the viewport. Where the viewport has fractions of pixels, that is another one unless it
+/// clamps no slope.
+pub(crate) fn oracle_camera(draw: &Draw) -> OracleCamera {
     let covered = Covered::of(&draw.viewport());
     let mut camera = OracleCamera::new(&draw.camera, covered.size).expect("one of the four models");
     for (principal, corner) in camera.principal.iter_mut().zip(covered.corner) {

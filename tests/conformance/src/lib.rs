@@ -16,6 +16,7 @@ pub mod judge;
 pub mod mistakes;
 pub mod record;
 pub mod report;
+mod resolved;
 mod run;
 pub mod second;
 

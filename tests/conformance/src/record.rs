@@ -4,13 +4,14 @@
 use ash::vk;
 use gaurast::vk::{
     GaussianAttributeLocationsGAURAST, GaussianCameraDataGAURAST, GaussianCameraSourceGAURAST,
-    PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST, PipelineGaussianApproximationStateCreateInfoGAURAST,
+    GaussianResolveInputLocationsGAURAST, PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST,
+    PipelineGaussianApproximationStateCreateInfoGAURAST,
 };
 use gaurast_oracle::oracle::Stored;
 use half::f16;
 
 use crate::device::{Buffer, Device, Error, Image, Scope, whole};
-use crate::draw::{Blend, Call, ColorFormat, Draw};
+use crate::draw::{Blend, Call, ColorFormat, Draw, Shown};
 use crate::implementation::Picture;
 
 /// Vertex buffers of a scene: positions, scales, rotations, opacities, coefficients.
@@ -555,10 +556,29 @@ fn pipeline(scope: &Scope<'_>, draw: &Draw) -> Result<(vk::Pipeline, Layout), Er
         state = state.camera_source(GaussianCameraSourceGAURAST::UNIFORM_BUFFER);
     }
     let [error, budget] = draw.approximation.unwrap_or_default();
+    if draw.shown.is_some() {
+        state = state.resolve_input_locations(
+            GaussianResolveInputLocationsGAURAST::default()
+                .accumulated_color(0)
+                .depth(1)
+                .linear_depth(2)
+                .median_gaussian(3)
+                .nearest_gaussian(4)
+                .first_camera(5),
+        );
+    }
+    let resolve = draw.shown.map(|shown| ResolveShader::new(scope, shown));
+    let resolve = resolve.transpose()?;
+    let specialization = resolve.as_ref().map(ResolveShader::specialization);
+    let stages: Vec<_> = (resolve.iter().zip(&specialization))
+        .map(|(shader, specialization)| shader.stage(specialization))
+        .collect();
+    let mut footprint = draw.footprint.unwrap_or_default();
     let mut approximation = PipelineGaussianApproximationStateCreateInfoGAURAST::default()
         .exponential_error(error)
         .contribution_budget(budget);
     let mut info = vk::GraphicsPipelineCreateInfo::default()
+        .stages(&stages)
         .vertex_input_state(&vertex_input)
         .input_assembly_state(&assembly)
         .viewport_state(&viewport)
@@ -573,6 +593,9 @@ fn pipeline(scope: &Scope<'_>, draw: &Draw) -> Result<(vk::Pipeline, Layout), Er
     if draw.approximation.is_some() {
         info = info.push_next(&mut approximation);
     }
+    if draw.footprint.is_some() {
+        info = info.push_next(&mut footprint);
+    }
     let device = &scope.device.raw;
     // SAFETY: see `device`.
     unsafe {
@@ -580,6 +603,50 @@ fn pipeline(scope: &Scope<'_>, draw: &Draw) -> Result<(vk::Pipeline, Layout), Er
         let pipeline = made.map_err(|(_, result)| Error::from(result))?[0];
         scope.later(move |device| device.destroy_pipeline(pipeline, None));
         Ok((pipeline, layout))
+    }
+}
+
+/// The resolve shader that shows some of its inputs.
+struct ResolveShader {
+    module: vk::ShaderModule,
+    /// The bytes of its constant.
+    number: [u8; 4],
+    entries: [vk::SpecializationMapEntry; 1],
+}
+
+impl ResolveShader {
+    fn new(scope: &Scope<'_>, shown: Shown) -> Result<Self, Error> {
+        let words: Vec<u32> = include_bytes!("../shaders/shown.frag.spv")
+            .chunks_exact(4)
+            .map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]]))
+            .collect();
+        let info = vk::ShaderModuleCreateInfo::default().code(&words);
+        // SAFETY: see `device`; the code is a fragment shader of SPIR-V.
+        let module = unsafe { scope.device.raw.create_shader_module(&info, None)? };
+        // SAFETY: see `device`.
+        scope.later(move |device| unsafe { device.destroy_shader_module(module, None) });
+        Ok(Self {
+            module,
+            number: shown.number().to_ne_bytes(),
+            entries: [vk::SpecializationMapEntry::default().size(4)],
+        })
+    }
+
+    fn specialization(&self) -> vk::SpecializationInfo<'_> {
+        vk::SpecializationInfo::default()
+            .map_entries(&self.entries)
+            .data(&self.number)
+    }
+
+    fn stage<'a>(
+        &self,
+        specialization: &'a vk::SpecializationInfo<'a>,
+    ) -> vk::PipelineShaderStageCreateInfo<'a> {
+        vk::PipelineShaderStageCreateInfo::default()
+            .stage(vk::ShaderStageFlags::FRAGMENT)
+            .module(self.module)
+            .name(c"main")
+            .specialization_info(specialization)
     }
 }
 

@@ -8,6 +8,7 @@ use gaurast_oracle::compare::write_difference;
 use crate::cases::Case;
 use crate::implementation::Implementation;
 use crate::judge::{Expected, expected, stored_before};
+use crate::resolved;
 
 /// The outcome of a case.
 #[derive(Clone, Debug)]
@@ -58,6 +59,12 @@ pub fn run(case: &Case, implementation: &dyn Implementation) -> Outcome {
         Ok(Err(error)) => return nothing(error.0),
         Err(_) => return nothing("the driver panics".to_owned()),
     };
+    if let Some(shown) = draw.shown {
+        return match resolved::distance(&draw, shown, &picture) {
+            Ok(distance) => Outcome::Pass(distance),
+            Err(message) => nothing(message),
+        };
+    }
     let expected = expected(&draw, &before);
     match expected.fault(&picture) {
         None => Outcome::Pass(expected.verdict(&picture).max_distance),

@@ -40,6 +40,8 @@ impl Implementation for Second {
             (draw.camera_in_buffer, "uniformBufferCamera"),
             (draw.instances.is_some(), "gaussianInstancing"),
             (draw.approximation.is_some(), "gaussianApproximation"),
+            (draw.footprint.is_some(), "gaussianCutOff"),
+            (draw.shown.is_some(), "resolveFragmentShader"),
             (draw.samples > 1, "gaussianMultisample"),
             (draw.blend != Blend::Over, "other blending"),
             (

@@ -357,3 +357,179 @@ fn fixed_function_projection_is_resolved_in_the_depths_of_its_camera() {
         assert!(covered > 3000, "{name}: {covered}");
     }
 }
+
+/// The accumulated colour, depths and linear depths, and then the median and the nearest Gaussian.
+fn tracked() -> [FragmentInput; 12] {
+    [
+        varying(resolve::ACCUMULATED),
+        varying(resolve::ACCUMULATED + 1),
+        varying(resolve::ACCUMULATED + 2),
+        varying(resolve::ACCUMULATED + 3),
+        varying(resolve::EXPECTED_DEPTH),
+        varying(resolve::MEDIAN_DEPTH),
+        varying(resolve::EXPECTED_LINEAR_DEPTH),
+        varying(resolve::MEDIAN_LINEAR_DEPTH),
+        varying(resolve::MEDIAN_GAUSSIAN),
+        varying(resolve::MEDIAN_GAUSSIAN + 1),
+        varying(resolve::NEAREST_GAUSSIAN),
+        varying(resolve::NEAREST_GAUSSIAN + 1),
+    ]
+}
+
+/// Holds what a program passed on of [`tracked`] against the reference, whose Gaussians have these numbers.
+#[track_caller]
+fn check_tracked(name: &str, ways: &[Vec<Resolved>], drawn: &super::device::Drawn, of: &[u32]) {
+    let mut covered = 0;
+    for (index, ways) in ways.iter().enumerate() {
+        let (color, depths) = (drawn.color[index], drawn.others[0][index]);
+        let named = drawn.others[1][index].map(f32::to_bits);
+        let is_there = depths != [-1.0; 4];
+        let ways: Vec<Resolved> = (ways.iter())
+            .filter(|way| way.covered == is_there)
+            .cloned()
+            .collect();
+        assert!(!ways.is_empty(), "{name}: pixel {index}");
+        if !is_there {
+            continue;
+        }
+        covered += 1;
+        for channel in 0..4 {
+            let is_within = within(&ways, color[channel], |way| vec![way.accumulated[channel]]);
+            assert!(is_within, "{name}: pixel {index}: {color:?}, {ways:?}");
+        }
+        let [expected, _, linear, median] = depths;
+        let is_within = within(&ways, expected, |way| vec![way.expected_depth]);
+        assert!(is_within, "{name}: pixel {index}: {expected}, {ways:?}");
+        // Depth variables are up to 8.
+        let is_within = within(&ways, linear / 8.0, |way| vec![way.expected_distance / 8.0]);
+        assert!(is_within, "{name}: pixel {index}: {linear}, {ways:?}");
+        let [first, first_instance, nearest, nearest_instance] = named;
+        assert_eq!([first_instance, nearest_instance], [0; 2], "{name}");
+        let mut medians = ways.iter().flat_map(|way| &way.median_gaussians);
+        let is_median = medians.any(|&(at, z)| of[at] == first && z == median);
+        let is_unknown = ways.iter().any(|way| way.medians_exhausted);
+        assert!(
+            is_median || is_unknown,
+            "{name}: pixel {index}: {first} at {median}, {ways:?}"
+        );
+        let mut firsts = ways.iter().filter_map(|way| way.nearest);
+        assert!(
+            firsts.any(|at| of[at] == nearest),
+            "{name}: pixel {index}: {nearest}, {ways:?}"
+        );
+    }
+    assert!(covered > 4000, "{name}: {covered}");
+}
+
+#[gaurast_runner::test(each = simd_levels())]
+fn gaussians_are_named_at_a_level(test: &gaurast_runner::Case) {
+    let outputs = cloud(47, 2000);
+    let ways = resolve_shaded(&outputs, SIZE, &UPRIGHT, &OracleState::default());
+    let device = device(level(test));
+    let all: Vec<u32> = (0..outputs.len() as u32).collect();
+    let case = Case {
+        resolve: Some(passing_on(&device, &tracked())),
+        blend: vec![REPLACE; 3],
+        clear: [-1.0; 4],
+        // Two draws of a set; the second begins in the middle of the buffer.
+        draws: vec![
+            super::draw(&device, &outputs, 0, 700),
+            super::draw(&device, &outputs, 700, 1300),
+        ],
+        ..whole(&device, &outputs)
+    };
+    let drawn = case.run(&device);
+    check_tracked(test.variant(), &ways, &drawn, &all);
+    // What is left out by depth is not named.
+    let is_before = |one: &&super::OracleOutputs| {
+        let [_, _, z, w] = one.position.map(f64::from);
+        ((z / w) as f32) < 0.5
+    };
+    let of: Vec<u32> = (0..)
+        .zip(&outputs)
+        .filter_map(|(number, one)| is_before(&one).then_some(number))
+        .collect();
+    let before: Vec<_> = outputs.iter().filter(is_before).copied().collect();
+    let ways = resolve_shaded(&before, SIZE, &UPRIGHT, &OracleState::default());
+    let tested = Case {
+        depth: Some((CompareOp::Less, true)),
+        ..case
+    };
+    let drawn = tested.run(&device);
+    check_tracked(test.variant(), &ways, &drawn, &of);
+    for (shown, stored) in std::iter::zip(&drawn.others[0], &drawn.depth) {
+        let expected = if *shown == [-1.0; 4] { 0.5 } else { shown[1] };
+        assert_eq!(*stored, expected);
+    }
+}
+
+#[gaurast_runner::test]
+fn samples_that_differ_name_their_own_gaussians() {
+    let outputs = cloud(48, 800);
+    let device = device(SimdLevel::Best);
+    let case = |sample_shading| Case {
+        resolve: Some(GaussianFragmentStage {
+            sample_shading,
+            ..passing_on(&device, &tracked()[..8])
+        }),
+        blend: vec![REPLACE; 2],
+        before: vec![triangle(&device, 4)],
+        depth: Some((CompareOp::Less, true)),
+        samples: 4,
+        ..whole(&device, &outputs)
+    };
+    let (shared, each) = (case(false).run(&device), case(true).run(&device));
+    assert!(shared.color == each.color && shared.others == each.others);
+    let covered = shared.others[0].iter().filter(|shown| shown[3] > 0.0);
+    assert!(covered.count() > 1000);
+}
+
+#[gaurast_runner::test]
+fn a_camera_is_read_without_gaussians() {
+    let scene = scenes::cloud(49, 500, 0);
+    let camera = scenes::camera(SIZE[0], SIZE[1]);
+    let device = device(SimdLevel::Best);
+    let seen = Camera {
+        eye: [0.25, -0.5, 1.0e6],
+        rotation: [0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 1.0],
+        focal_length: camera.focal,
+        principal_point: camera.principal,
+        depth_coefficients: [1.05, -2.1],
+        near_plane: 0.25,
+        ..Camera::default()
+    };
+    let mut placed = scene.clone();
+    for position in &mut placed.positions {
+        *position = [position[1], -position[0], position[2] + 1.0e6];
+    }
+    let inputs: Vec<FragmentInput> = (0..24).map(|at| varying(resolve::CAMERA + at)).collect();
+    let drawn = Case {
+        resolve: Some(passing_on(&device, &inputs)),
+        fixed: Some((append(&placed), seen)),
+        blend: vec![REPLACE; 6],
+        clear: [-1.0; 4],
+        ..whole(&device, &[])
+    };
+    let drawn = drawn.run(&device);
+    let expected = [
+        [0.0, 1.0, 0.0, 0.5],
+        [-1.0, 0.0, 0.0, 0.25],
+        [0.0, 0.0, 1.0, -1.0e6],
+        [
+            camera.focal[0],
+            camera.focal[1],
+            camera.principal[0],
+            camera.principal[1],
+        ],
+        [1.05, -2.1, 0.25, f32::INFINITY],
+        [0.25, -0.5, 1.0e6, 0.0],
+    ];
+    let pictures = std::iter::once(&drawn.color).chain(&drawn.others);
+    for (picture, expected) in pictures.zip(expected) {
+        let shown: Vec<_> = picture
+            .iter()
+            .filter(|texel| **texel != [-1.0; 4])
+            .collect();
+        assert!(shown.len() > 1000 && shown.iter().all(|texel| **texel == expected));
+    }
+}

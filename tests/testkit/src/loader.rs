@@ -27,6 +27,14 @@ pub fn manifest(folder: &Path) -> PathBuf {
 /// # Panics
 /// If `inside` fails.
 pub fn through_the_loader(case: &Case, inside: impl FnOnce()) {
+    through_the_loader_with(case, &[], inside);
+}
+
+/// As [`through_the_loader`], with further variables in the environment of the process.
+///
+/// # Panics
+/// If it fails there.
+pub fn through_the_loader_with(case: &Case, variables: &[(&str, &str)], inside: impl FnOnce()) {
     if case.is_alone() {
         return inside();
     }
@@ -37,7 +45,8 @@ pub fn through_the_loader(case: &Case, inside: impl FnOnce()) {
             .env("VK_DRIVER_FILES", &manifest)
             .env("VK_ICD_FILENAMES", &manifest)
             .env("VK_LAYER_CUSTOM_STYPE_LIST", unregistered_structures())
-            .env_remove("VK_INSTANCE_LAYERS");
+            .env_remove("VK_INSTANCE_LAYERS")
+            .envs(variables.iter().copied());
     });
 }
 
@@ -49,6 +58,7 @@ fn unregistered_structures() -> String {
         PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST as Features,
         PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST as Properties,
         PipelineGaussianApproximationStateCreateInfoGAURAST as Approximation,
+        PipelineGaussianFootprintStateCreateInfoGAURAST as Footprint,
         PipelineGaussianStateCreateInfoGAURAST as State,
     };
     let separator = if cfg!(windows) { ";" } else { ":" };
@@ -60,6 +70,7 @@ fn unregistered_structures() -> String {
             Approximation::STRUCTURE_TYPE,
             size_of::<Approximation<'_>>(),
         ),
+        (Footprint::STRUCTURE_TYPE, size_of::<Footprint<'_>>()),
         (Camera::STRUCTURE_TYPE, size_of::<Camera<'_>>()),
     ]
     .map(|(structure, size)| format!("{}{separator}{size}", structure.as_raw()))

@@ -2,7 +2,8 @@
 
 use ash::vk;
 use gaurast::vk::{
-    PipelineGaussianApproximationStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+    PipelineGaussianApproximationStateCreateInfoGAURAST,
+    PipelineGaussianFootprintStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 
 use crate::descriptors::{Binding, Bindings, Sets, write};
@@ -99,6 +100,8 @@ pub struct Graphics<'a> {
     pub gaussian: Option<PipelineGaussianStateCreateInfoGAURAST<'a>>,
     /// The approximations that Gaussian draws may use.
     pub approximation: Option<PipelineGaussianApproximationStateCreateInfoGAURAST<'static>>,
+    /// The pixels that Gaussians may reach.
+    pub footprint: Option<PipelineGaussianFootprintStateCreateInfoGAURAST<'static>>,
 }
 
 impl Default for Graphics<'_> {
@@ -131,6 +134,7 @@ impl Default for Graphics<'_> {
             subpass: None,
             gaussian: None,
             approximation: None,
+            footprint: None,
         }
     }
 }
@@ -246,6 +250,7 @@ impl Graphics<'_> {
             .stencil_attachment_format(stencil);
         let mut gaussian = self.gaussian.unwrap_or_default();
         let mut approximation = self.approximation.unwrap_or_default();
+        let mut footprint = self.footprint.unwrap_or_default();
         let mut info = vk::GraphicsPipelineCreateInfo::default()
             .stages(stages)
             .vertex_input_state(&vertex_input)
@@ -268,6 +273,9 @@ impl Graphics<'_> {
         }
         if self.approximation.is_some() {
             info = info.push_next(&mut approximation);
+        }
+        if self.footprint.is_some() {
+            info = info.push_next(&mut footprint);
         }
         let cache = vk::PipelineCache::null();
         // SAFETY: see the crate.

@@ -42,6 +42,10 @@ impl Default for GaussianResolveInputLocationsGAURAST {
         Self {
             accumulated_color: GAUSSIAN_LOCATION_UNUSED_GAURAST,
             depth: GAUSSIAN_LOCATION_UNUSED_GAURAST,
+            linear_depth: GAUSSIAN_LOCATION_UNUSED_GAURAST,
+            median_gaussian: GAUSSIAN_LOCATION_UNUSED_GAURAST,
+            nearest_gaussian: GAUSSIAN_LOCATION_UNUSED_GAURAST,
+            first_camera: GAUSSIAN_LOCATION_UNUSED_GAURAST,
         }
     }
 }

@@ -50,6 +50,11 @@ pub const STRUCTURE_TYPE_PIPELINE_GAUSSIAN_APPROXIMATION_STATE_CREATE_INFO_GAURA
 pub const STRUCTURE_TYPE_GAUSSIAN_SPHERICAL_HARMONICS_BUFFER_GAURAST: vk::StructureType =
     vk::StructureType::from_raw(1_000_997_005);
 
+/// `VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_FOOTPRINT_STATE_CREATE_INFO_GAURAST`.
+#[doc(alias = "VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_FOOTPRINT_STATE_CREATE_INFO_GAURAST")]
+pub const STRUCTURE_TYPE_PIPELINE_GAUSSIAN_FOOTPRINT_STATE_CREATE_INFO_GAURAST: vk::StructureType =
+    vk::StructureType::from_raw(1_000_997_006);
+
 /// [`PipelineGaussianStateCreateInfoGAURAST::order`] is set by `vkCmdSetGaussianOrderGAURAST`.
 #[doc(alias = "VK_DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST")]
 pub const DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST: vk::DynamicState =
@@ -236,6 +241,31 @@ vk_enum! {
     }
 }
 
+vk_enum! {
+    /// The shape outside which a Gaussian does not contribute, of k = `cutOffDeviations` standard
+    /// deviations of its covariance S in the picture (the low-pass included), about its mean.
+    /// Tiles are 16 x 16 pixels and begin at the upper left corner of the area that the viewport
+    /// covers.
+    #[doc(alias = "VkGaussianCutOffGAURAST")]
+    pub struct GaussianCutOffGAURAST {
+        /// There is none: `alphaFloor` alone decides.
+        #[doc(alias = "VK_GAUSSIAN_CUT_OFF_NONE_GAURAST")]
+        NONE = 0,
+        /// The ellipse of a Mahalanobis distance of k, as in `KHR_gaussian_splatting`. Needs
+        /// `gaussianCutOff`.
+        #[doc(alias = "VK_GAUSSIAN_CUT_OFF_ELLIPSE_GAURAST")]
+        ELLIPSE = 1,
+        /// The tiles that a square of k deviations along the longer axis of the ellipse touches,
+        /// rounded up to whole pixels, as in 3DGS. Needs `gaussianCutOff`.
+        #[doc(alias = "VK_GAUSSIAN_CUT_OFF_TILE_SQUARE_GAURAST")]
+        TILE_SQUARE = 2,
+        /// The tiles that the rectangle of k deviations along x and y touches, rounded up to whole
+        /// pixels, as in gsplat. Needs `gaussianCutOff`.
+        #[doc(alias = "VK_GAUSSIAN_CUT_OFF_TILE_RECTANGLE_GAURAST")]
+        TILE_RECTANGLE = 3,
+    }
+}
+
 vk_flags! {
     /// The functions that are applied to attributes before anything else, and the place of
     /// spherical harmonics. Fixed-function projection only.
@@ -320,6 +350,14 @@ pub struct PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'a> {
     pub spherical_harmonics_buffer: vk::Bool32,
     /// The dynamic states [`DYNAMIC_STATE_GAUSSIAN_..._GAURAST`] in Gaussian pipelines.
     pub gaussian_dynamic_state: vk::Bool32,
+    /// The `medianGaussian` and `nearestGaussian` inputs of resolve shaders, by which a pixel
+    /// tells the Gaussians that it shows.
+    pub resolve_gaussian_indices: vk::Bool32,
+    /// A `cutOff` other than [`GaussianCutOffGAURAST::NONE`], by which other renderers' pictures
+    /// are matched.
+    pub gaussian_cut_off: vk::Bool32,
+    /// A `compensationFloor` other than 0.
+    pub opacity_compensation_floor: vk::Bool32,
     /// The lifetime of the `p_next` chain.
     pub _marker: PhantomData<&'a ()>,
 }
@@ -360,6 +398,9 @@ impl Default for PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_> {
             attribute_activation: vk::Bool32::default(),
             spherical_harmonics_buffer: vk::Bool32::default(),
             gaussian_dynamic_state: vk::Bool32::default(),
+            resolve_gaussian_indices: vk::Bool32::default(),
+            gaussian_cut_off: vk::Bool32::default(),
+            opacity_compensation_floor: vk::Bool32::default(),
             _marker: PhantomData,
         }
     }
@@ -390,6 +431,9 @@ impl PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_> {
         attribute_activation,
         spherical_harmonics_buffer,
         gaussian_dynamic_state,
+        resolve_gaussian_indices,
+        gaussian_cut_off,
+        opacity_compensation_floor,
     }
 }
 
@@ -553,12 +597,29 @@ pub struct GaussianResolveInputLocationsGAURAST {
     /// contributed, weighted by T alpha; and the depth of the Gaussian at which T falls below one
     /// half, or of the last one that contributed.
     pub depth: u32,
+    /// The same two of the depth variable z (w of `gl_Position`, where a vertex shader projects),
+    /// a `vec2` in units of world space: linear, and independent of planes and viewport.
+    pub linear_depth: u32,
+    /// The Gaussian whose depth is the median, a flat `uvec2`: its vertex index and its instance
+    /// index. Needs `resolveGaussianIndices`.
+    pub median_gaussian: u32,
+    /// The first Gaussian, in the pipeline's order, that contributed, a flat `uvec2` likewise.
+    /// Needs `resolveGaussianIndices`.
+    pub nearest_gaussian: u32,
+    /// The first of the 6 consecutive locations at which the view's camera stands, a `vec4` each:
+    /// the rows of the 3x4 matrix from world to camera axes; focal length and principal point;
+    /// depth coefficients, near and far plane; eye and model. Fixed-function projection only.
+    pub first_camera: u32,
 }
 
 impl GaussianResolveInputLocationsGAURAST {
     setters! {
         accumulated_color: u32,
         depth: u32,
+        linear_depth: u32,
+        median_gaussian: u32,
+        nearest_gaussian: u32,
+        first_camera: u32,
     }
 }
 
@@ -711,6 +772,61 @@ impl PipelineGaussianApproximationStateCreateInfoGAURAST<'_> {
     setters! {
         exponential_error: f32,
         contribution_budget: f32,
+    }
+}
+
+/// The pixels that a pipeline's Gaussians may reach, so that pictures are those of other
+/// renderers.
+///
+/// Chain it to `VkGraphicsPipelineCreateInfo`, beside
+/// [`PipelineGaussianStateCreateInfoGAURAST`]. Without it a Gaussian contributes wherever its
+/// alpha reaches `alphaFloor`, and compensation has no floor.
+#[doc(alias = "VkPipelineGaussianFootprintStateCreateInfoGAURAST")]
+#[repr(C)]
+#[derive(Copy, Clone, Debug)]
+#[must_use]
+pub struct PipelineGaussianFootprintStateCreateInfoGAURAST<'a> {
+    /// The structure's type.
+    pub s_type: vk::StructureType,
+    /// The next structure of the chain, or null.
+    pub p_next: *const c_void,
+    /// The shape outside which a Gaussian does not contribute, whatever its alpha.
+    pub cut_off: GaussianCutOffGAURAST,
+    /// The size of that shape in standard deviations k; finite and greater than 0, unless
+    /// `cut_off` is [`GaussianCutOffGAURAST::NONE`]. 3 in 3DGS, 3.33 in gsplat.
+    pub cut_off_deviations: f32,
+    /// With compensated opacity, the least ratio of determinants that the root is taken of; in
+    /// \[0, 1\]. 0.000025 in 3DGS, 0 in gsplat.
+    pub compensation_floor: f32,
+    /// The lifetime of the `p_next` chain.
+    pub _marker: PhantomData<&'a ()>,
+}
+
+tagged_structure!(
+    PipelineGaussianFootprintStateCreateInfoGAURAST =
+        STRUCTURE_TYPE_PIPELINE_GAUSSIAN_FOOTPRINT_STATE_CREATE_INFO_GAURAST,
+    ExtendsGraphicsPipelineCreateInfo
+);
+
+impl Default for PipelineGaussianFootprintStateCreateInfoGAURAST<'_> {
+    #[inline]
+    fn default() -> Self {
+        Self {
+            s_type: <Self as vk::TaggedStructure>::STRUCTURE_TYPE,
+            p_next: core::ptr::null(),
+            cut_off: GaussianCutOffGAURAST::default(),
+            cut_off_deviations: f32::default(),
+            compensation_floor: f32::default(),
+            _marker: PhantomData,
+        }
+    }
+}
+
+impl PipelineGaussianFootprintStateCreateInfoGAURAST<'_> {
+    setters! {
+        cut_off: GaussianCutOffGAURAST,
+        cut_off_deviations: f32,
+        compensation_floor: f32,
     }
 }
 

@@ -17,7 +17,7 @@ macro_rules! assert_layout {
 
 #[gaurast_runner::test]
 fn features() {
-    assert_layout!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, 112, 8, {
+    assert_layout!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, 120, 8, {
         s_type: 0,
         p_next: 8,
         gaussian_primitive_topology: 16,
@@ -43,6 +43,9 @@ fn features() {
         attribute_activation: 96,
         spherical_harmonics_buffer: 100,
         gaussian_dynamic_state: 104,
+        resolve_gaussian_indices: 108,
+        gaussian_cut_off: 112,
+        opacity_compensation_floor: 116,
     });
 }
 
@@ -76,11 +79,15 @@ fn pipeline_state() {
         color: 8,
         depth_key: 12,
     });
-    assert_layout!(GaussianResolveInputLocationsGAURAST, 8, 4, {
+    assert_layout!(GaussianResolveInputLocationsGAURAST, 24, 4, {
         accumulated_color: 0,
         depth: 4,
+        linear_depth: 8,
+        median_gaussian: 12,
+        nearest_gaussian: 16,
+        first_camera: 20,
     });
-    assert_layout!(PipelineGaussianStateCreateInfoGAURAST<'_>, 136, 8, {
+    assert_layout!(PipelineGaussianStateCreateInfoGAURAST<'_>, 152, 8, {
         s_type: 0,
         p_next: 8,
         flags: 16,
@@ -91,17 +98,24 @@ fn pipeline_state() {
         attribute_locations: 36,
         vertex_output_locations: 64,
         resolve_input_locations: 80,
-        order: 88,
-        precision: 92,
-        antialiasing: 96,
-        low_pass_variance: 100,
-        alpha_floor: 104,
-        alpha_ceiling: 108,
-        transmittance_floor: 112,
-        camera_source: 116,
-        camera_set: 120,
-        camera_binding: 124,
-        camera_count: 128,
+        order: 104,
+        precision: 108,
+        antialiasing: 112,
+        low_pass_variance: 116,
+        alpha_floor: 120,
+        alpha_ceiling: 124,
+        transmittance_floor: 128,
+        camera_source: 132,
+        camera_set: 136,
+        camera_binding: 140,
+        camera_count: 144,
+    });
+    assert_layout!(PipelineGaussianFootprintStateCreateInfoGAURAST<'_>, 32, 8, {
+        s_type: 0,
+        p_next: 8,
+        cut_off: 16,
+        cut_off_deviations: 20,
+        compensation_floor: 24,
     });
     assert_layout!(PipelineGaussianApproximationStateCreateInfoGAURAST<'_>, 24, 8, {
         s_type: 0,

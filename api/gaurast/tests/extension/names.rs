@@ -187,6 +187,27 @@ pub const LAYOUT: &[(&str, usize)] = &[
         ),
     ),
     (
+        "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, resolveGaussianIndices)",
+        offset_of!(
+            PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
+            resolve_gaussian_indices
+        ),
+    ),
+    (
+        "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, gaussianCutOff)",
+        offset_of!(
+            PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
+            gaussian_cut_off
+        ),
+    ),
+    (
+        "offsetof(VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, opacityCompensationFloor)",
+        offset_of!(
+            PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
+            opacity_compensation_floor
+        ),
+    ),
+    (
         "sizeof(VkPhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST)",
         size_of::<PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_>>(),
     ),
@@ -302,6 +323,22 @@ pub const LAYOUT: &[(&str, usize)] = &[
     (
         "offsetof(VkGaussianResolveInputLocationsGAURAST, depth)",
         offset_of!(GaussianResolveInputLocationsGAURAST, depth),
+    ),
+    (
+        "offsetof(VkGaussianResolveInputLocationsGAURAST, linearDepth)",
+        offset_of!(GaussianResolveInputLocationsGAURAST, linear_depth),
+    ),
+    (
+        "offsetof(VkGaussianResolveInputLocationsGAURAST, medianGaussian)",
+        offset_of!(GaussianResolveInputLocationsGAURAST, median_gaussian),
+    ),
+    (
+        "offsetof(VkGaussianResolveInputLocationsGAURAST, nearestGaussian)",
+        offset_of!(GaussianResolveInputLocationsGAURAST, nearest_gaussian),
+    ),
+    (
+        "offsetof(VkGaussianResolveInputLocationsGAURAST, firstCamera)",
+        offset_of!(GaussianResolveInputLocationsGAURAST, first_camera),
     ),
     (
         "sizeof(VkPipelineGaussianStateCreateInfoGAURAST)",
@@ -439,6 +476,36 @@ pub const LAYOUT: &[(&str, usize)] = &[
         offset_of!(
             PipelineGaussianApproximationStateCreateInfoGAURAST<'_>,
             contribution_budget
+        ),
+    ),
+    (
+        "sizeof(VkPipelineGaussianFootprintStateCreateInfoGAURAST)",
+        size_of::<PipelineGaussianFootprintStateCreateInfoGAURAST<'_>>(),
+    ),
+    (
+        "offsetof(VkPipelineGaussianFootprintStateCreateInfoGAURAST, sType)",
+        offset_of!(PipelineGaussianFootprintStateCreateInfoGAURAST<'_>, s_type),
+    ),
+    (
+        "offsetof(VkPipelineGaussianFootprintStateCreateInfoGAURAST, pNext)",
+        offset_of!(PipelineGaussianFootprintStateCreateInfoGAURAST<'_>, p_next),
+    ),
+    (
+        "offsetof(VkPipelineGaussianFootprintStateCreateInfoGAURAST, cutOff)",
+        offset_of!(PipelineGaussianFootprintStateCreateInfoGAURAST<'_>, cut_off),
+    ),
+    (
+        "offsetof(VkPipelineGaussianFootprintStateCreateInfoGAURAST, cutOffDeviations)",
+        offset_of!(
+            PipelineGaussianFootprintStateCreateInfoGAURAST<'_>,
+            cut_off_deviations
+        ),
+    ),
+    (
+        "offsetof(VkPipelineGaussianFootprintStateCreateInfoGAURAST, compensationFloor)",
+        offset_of!(
+            PipelineGaussianFootprintStateCreateInfoGAURAST<'_>,
+            compensation_floor
         ),
     ),
     (
@@ -602,6 +669,10 @@ pub const VALUES: &[(&str, i64)] = &[
         STRUCTURE_TYPE_GAUSSIAN_SPHERICAL_HARMONICS_BUFFER_GAURAST.as_raw() as i64,
     ),
     (
+        "VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_FOOTPRINT_STATE_CREATE_INFO_GAURAST",
+        STRUCTURE_TYPE_PIPELINE_GAUSSIAN_FOOTPRINT_STATE_CREATE_INFO_GAURAST.as_raw() as i64,
+    ),
+    (
         "VK_DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST",
         DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST.as_raw() as i64,
     ),
@@ -716,6 +787,22 @@ pub const VALUES: &[(&str, i64)] = &[
     (
         "VK_GAUSSIAN_CAMERA_MODEL_EQUIRECTANGULAR_GAURAST",
         GaussianCameraModelGAURAST::EQUIRECTANGULAR.as_raw() as i64,
+    ),
+    (
+        "VK_GAUSSIAN_CUT_OFF_NONE_GAURAST",
+        GaussianCutOffGAURAST::NONE.as_raw() as i64,
+    ),
+    (
+        "VK_GAUSSIAN_CUT_OFF_ELLIPSE_GAURAST",
+        GaussianCutOffGAURAST::ELLIPSE.as_raw() as i64,
+    ),
+    (
+        "VK_GAUSSIAN_CUT_OFF_TILE_SQUARE_GAURAST",
+        GaussianCutOffGAURAST::TILE_SQUARE.as_raw() as i64,
+    ),
+    (
+        "VK_GAUSSIAN_CUT_OFF_TILE_RECTANGLE_GAURAST",
+        GaussianCutOffGAURAST::TILE_RECTANGLE.as_raw() as i64,
     ),
     (
         "VK_PIPELINE_GAUSSIAN_STATE_CREATE_LOG_SCALE_BIT_GAURAST",

@@ -72,6 +72,8 @@ pub(super) struct Structure {
     pub(super) structure_type: Option<String>,
     /// The structures whose `pNext` chains may contain it.
     pub(super) extends: Vec<String>,
+    /// Whether only the implementation writes it.
+    pub(super) is_returned: bool,
     pub(super) members: Vec<Member>,
     pub(super) comment: String,
 }
@@ -96,6 +98,10 @@ pub(super) struct Member {
 pub(super) struct Command {
     pub(super) name: String,
     pub(super) parameters: Vec<Member>,
+    /// The kinds of queues whose command buffers may have it, with commas between.
+    pub(super) queues: String,
+    /// `inside`, `outside` or `both`.
+    pub(super) render_pass: String,
     pub(super) comment: String,
 }
 
@@ -266,6 +272,7 @@ fn structure(ty: TypesChild) -> Option<Structure> {
     let mut structure = Structure {
         name: ty.name?,
         structure_type: None,
+        is_returned: ty.returnedonly.as_deref() == Some("true"),
         extends: ty
             .structextends
             .iter()
@@ -308,6 +315,8 @@ fn command(command: vk_parse::Command) -> Option<Command> {
                 ..Member::declared(&parameter.definition.code)
             })
             .collect(),
+        queues: definition.queues.unwrap_or_default(),
+        render_pass: definition.renderpass.unwrap_or_default(),
         comment: definition.comment.unwrap_or_default(),
     })
 }

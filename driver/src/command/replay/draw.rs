@@ -38,7 +38,7 @@ pub(crate) enum DrawError {
     },
     /// The camera's model is not enabled.
     #[error(
-        "the camera's model is {0:?}, and its feature is not enabled (VUID-VkGaussianCameraGAURAST-model-parameter)"
+        "the camera's model is {0:?}, and its feature is not enabled (VUID-VkGaussianCameraGAURAST-model-90079)"
     )]
     CameraModel(CameraModel),
     /// The camera's model doesn't support the pipeline's modes.

@@ -21,8 +21,8 @@ use gaurast::vk::{
 };
 use simdevice::packet::Activations;
 use simdevice::state::gaussian::{
-    CameraModel, GaussianApproximation, GaussianGeometry, GaussianLinearization, GaussianPrecision,
-    GaussianState,
+    CameraModel, GaussianApproximation, GaussianFootprint, GaussianGeometry, GaussianLinearization,
+    GaussianPrecision, GaussianState,
 };
 use simdevice::state::{DrawState, Rect, Viewport};
 use std::sync::Arc;
@@ -166,6 +166,7 @@ impl GaussianPipeline {
         modes(gaussian, features)?;
         numbers(gaussian)?;
         let approximation = approximation(info)?;
+        let footprint = footprint(info, features)?;
         fixed_state(info, features)?;
         let mut fragments = FixedFunctionState::of_gaussians(info)?;
         let taken = info.dynamic.iter().copied();
@@ -176,6 +177,7 @@ impl GaussianPipeline {
         });
         let state = GaussianState {
             approximation,
+            footprint,
             ..state(gaussian, fragments.draw_state())?
         };
         require_modes(features, &state)?;
@@ -321,7 +323,7 @@ fn state(
         alpha_ceiling: gaussian.alpha_ceiling,
         transmittance_floor: gaussian.transmittance_floor,
         approximation: GaussianApproximation::default(),
-        negative_one_to_one: fragments.negative_one_to_one,
+        footprint: GaussianFootprint::default(),
         sample_mask: fragments.sample_mask,
         depth_stencil: fragments.depth_stencil,
         logic_op: fragments.logic_op,

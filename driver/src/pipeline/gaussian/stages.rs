@@ -172,21 +172,58 @@ const RESOLVE_INPUTS: &str = "VUID-VkGaussianResolveInputLocationsGAURAST-None-9
 /// The varyings that a resolve shader may read, by location and component.
 fn varyings(state: &PipelineGaussianStateCreateInfoGAURAST) -> Result<Varyings, Error> {
     let locations = &state.resolve_input_locations;
-    let (color, depth) = (locations.accumulated_color, locations.depth);
-    if color == depth && color != GAUSSIAN_LOCATION_UNUSED_GAURAST {
-        return Err(Error::usage(
-            RESOLVE_INPUTS,
-            format!("accumulatedColor and depth are both location {color}"),
-        ));
+    let inputs = [
+        (
+            "accumulatedColor",
+            locations.accumulated_color,
+            resolve::ACCUMULATED,
+            4,
+        ),
+        ("depth", locations.depth, resolve::EXPECTED_DEPTH, 2),
+        (
+            "linearDepth",
+            locations.linear_depth,
+            resolve::EXPECTED_LINEAR_DEPTH,
+            2,
+        ),
+        (
+            "medianGaussian",
+            locations.median_gaussian,
+            resolve::MEDIAN_GAUSSIAN,
+            2,
+        ),
+        (
+            "nearestGaussian",
+            locations.nearest_gaussian,
+            resolve::NEAREST_GAUSSIAN,
+            2,
+        ),
+        (
+            "firstCamera",
+            locations.first_camera,
+            resolve::CAMERA,
+            4 * resolve::CAMERA_LOCATIONS,
+        ),
+    ];
+    let mut places = Varyings::new();
+    for (name, first, number, count) in inputs {
+        if first == GAUSSIAN_LOCATION_UNUSED_GAURAST {
+            continue;
+        }
+        for at in 0..count {
+            let place = (first.saturating_add(at / 4), at % 4);
+            if places.insert(place, number + at).is_some() {
+                return Err(Error::usage(
+                    RESOLVE_INPUTS,
+                    format!(
+                        "{name} has location {}, as another input of the resolve shader has",
+                        place.0
+                    ),
+                ));
+            }
+        }
     }
-    let at = |location: u32, first: u32, count: u32| {
-        let is_used = location != GAUSSIAN_LOCATION_UNUSED_GAURAST;
-        let numbers = (0..count).filter(move |_| is_used);
-        numbers.map(move |component| ((location, component), first + component))
-    };
-    let accumulated = at(locations.accumulated_color, resolve::ACCUMULATED, 4);
-    let depths = at(locations.depth, resolve::EXPECTED_DEPTH, 2);
-    Ok(accumulated.chain(depths).collect())
+    Ok(places)
 }
 
 /// Refuses inputs and outputs that a resolve shader can't have.
@@ -200,14 +237,21 @@ fn check_resolve(interface: &Interface, varyings: &Varyings) -> Result<(), Error
         else {
             continue;
         };
-        let is_known = varyings.contains_key(&(location, component));
-        if !is_known || input.numeric != (ScalarType::Float { width: 32 }) {
+        let wanted = varyings.get(&(location, component)).map(|number| {
+            if (resolve::MEDIAN_GAUSSIAN..resolve::CAMERA).contains(number) {
+                ScalarType::Uint { width: 32 }
+            } else {
+                ScalarType::Float { width: 32 }
+            }
+        });
+        if wanted != Some(input.numeric) {
             return Err(Error::usage(
                 RESOLVE_INPUTS,
                 format!(
-                    "the fragment shader reads component {component} of location {location}, where \
-                     the pipeline has no 32-bit floating point for it: neither accumulatedColor nor \
-                     depth"
+                    "the fragment shader reads component {component} of location {location} as {:?}, where \
+                     resolveInputLocations has {}",
+                    input.numeric,
+                    wanted.map_or("nothing".to_owned(), |wanted| format!("{wanted:?}")),
                 ),
             ));
         }

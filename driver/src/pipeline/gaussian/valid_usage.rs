@@ -9,11 +9,14 @@ use crate::registry::features::Features;
 use ash::vk;
 use gaurast::vk::{
     GAUSSIAN_LOCATION_UNUSED_GAURAST, GaussianAntialiasingGAURAST,
-    GaussianAttributeLocationsGAURAST, GaussianGeometryGAURAST, GaussianLinearizationGAURAST,
-    GaussianOrderGAURAST, GaussianPrecisionGAURAST, GaussianProjectionModeGAURAST,
-    PipelineGaussianStateCreateFlagsGAURAST as Flags, PipelineGaussianStateCreateInfoGAURAST,
+    GaussianAttributeLocationsGAURAST, GaussianCutOffGAURAST, GaussianGeometryGAURAST,
+    GaussianLinearizationGAURAST, GaussianOrderGAURAST, GaussianPrecisionGAURAST,
+    GaussianProjectionModeGAURAST, PipelineGaussianStateCreateFlagsGAURAST as Flags,
+    PipelineGaussianStateCreateInfoGAURAST,
 };
-use simdevice::state::gaussian::{GaussianApproximation, GaussianOrder, GaussianState};
+use simdevice::state::gaussian::{
+    GaussianApproximation, GaussianCutOff, GaussianFootprint, GaussianOrder, GaussianState,
+};
 use std::ops::Range;
 
 pub(super) const STRUCTURE: &str = "VkPipelineGaussianStateCreateInfoGAURAST";
@@ -113,6 +116,21 @@ pub(super) const ATTRIBUTE_ACTIVATION: Feature = (
     "attributeActivation",
     "VUID-VkPipelineGaussianStateCreateInfoGAURAST-attributeActivation-90046",
 );
+pub(super) const RESOLVE_INDICES: Feature = (
+    |features| features.resolve_gaussian_indices,
+    "resolveGaussianIndices",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-resolveGaussianIndices-90073",
+);
+pub(super) const CUT_OFF: Feature = (
+    |features| features.gaussian_cut_off,
+    "gaussianCutOff",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianCutOff-90074",
+);
+pub(super) const COMPENSATION_FLOOR: Feature = (
+    |features| features.opacity_compensation_floor,
+    "opacityCompensationFloor",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-opacityCompensationFloor-90075",
+);
 pub(super) const DYNAMIC_STATE: Feature = (
     |features| features.gaussian_dynamic_state,
     "gaussianDynamicState",
@@ -135,8 +153,18 @@ fn not_enabled((_, name, vuid): Feature, what: &str) -> Error {
 }
 
 pub(super) fn unknown(field: &str, value: &dyn std::fmt::Debug) -> Error {
+    let vuid = match field {
+        "flags" => "VUID-VkPipelineGaussianStateCreateInfoGAURAST-flags-parameter",
+        "geometry" => "VUID-VkPipelineGaussianStateCreateInfoGAURAST-geometry-parameter",
+        "linearization" => "VUID-VkPipelineGaussianStateCreateInfoGAURAST-linearization-parameter",
+        "order" => "VUID-VkPipelineGaussianStateCreateInfoGAURAST-order-parameter",
+        "precision" => "VUID-VkPipelineGaussianStateCreateInfoGAURAST-precision-parameter",
+        "antialiasing" => "VUID-VkPipelineGaussianStateCreateInfoGAURAST-antialiasing-parameter",
+        "cameraSource" => "VUID-VkPipelineGaussianStateCreateInfoGAURAST-cameraSource-parameter",
+        _ => "VUID-VkPipelineGaussianStateCreateInfoGAURAST-projectionMode-parameter",
+    };
     Error::usage(
-        "VUID-VkPipelineGaussianStateCreateInfoGAURAST-parameter",
+        vuid,
         format!("{STRUCTURE}: {field} has the unknown value {value:?}"),
     )
 }
@@ -164,8 +192,12 @@ pub(super) struct Modes {
     is_placed: bool,
     /// True if the vertex shader writes the sort key.
     has_key: bool,
-    /// True if the fragment stage reads depths.
-    reads_depth: bool,
+    /// The fragment stage has depths or Gaussians for inputs.
+    is_tracking: bool,
+    /// The fragment stage has a camera for an input.
+    reads_camera: bool,
+    /// There is a cut-off.
+    is_cut: bool,
 }
 
 impl Modes {
@@ -174,6 +206,7 @@ impl Modes {
         gaussian: &PipelineGaussianStateCreateInfoGAURAST,
     ) -> Self {
         let is_used = |location: u32| location != GAUSSIAN_LOCATION_UNUSED_GAURAST;
+        let (resolves, inputs) = (has_fragment_stage(info), gaussian.resolve_input_locations);
         Self {
             // An invalid value is refused where it is converted.
             order: values::order(gaussian.order).unwrap_or(GaussianOrder::ViewDepth),
@@ -184,8 +217,19 @@ impl Modes {
             is_linearized: gaussian.linearization != GaussianLinearizationGAURAST::JACOBIAN,
             is_placed: is_used(gaussian.attribute_locations.first_model_matrix),
             has_key: is_used(gaussian.vertex_output_locations.depth_key),
-            reads_depth: has_fragment_stage(info)
-                && is_used(gaussian.resolve_input_locations.depth),
+            is_tracking: resolves
+                && [
+                    inputs.depth,
+                    inputs.linear_depth,
+                    inputs.median_gaussian,
+                    inputs.nearest_gaussian,
+                ]
+                .into_iter()
+                .any(is_used),
+            reads_camera: resolves && is_used(inputs.first_camera),
+            is_cut: info
+                .footprint
+                .is_some_and(|footprint| footprint.cut_off != GaussianCutOffGAURAST::NONE),
         }
     }
 
@@ -227,10 +271,20 @@ impl Modes {
                 "order is PER_PIXEL, but projectionMode is VERTEX_SHADER",
             ),
             (
-                self.reads_depth && (half || per_pixel),
+                self.is_tracking && (half || per_pixel),
                 "VUID-VkGaussianResolveInputLocationsGAURAST-depth-90031",
-                "a fragment stage has depths for an input, but precision is FLOAT16 or order is PER_PIXEL, which \
-                 accumulate none",
+                "a fragment stage has depths or Gaussians for an input, but precision is FLOAT16 or order is PER_PIXEL, \
+                 which keep none",
+            ),
+            (
+                shaded && self.reads_camera,
+                "VUID-VkGaussianResolveInputLocationsGAURAST-firstCamera-90072",
+                "firstCamera is used, but projectionMode is VERTEX_SHADER, which has no camera",
+            ),
+            (
+                self.is_cut && (!shaded && flat || half),
+                "VUID-VkPipelineGaussianFootprintStateCreateInfoGAURAST-cutOff-90078",
+                "there is a cut-off, but geometry is GAUSSIAN_2D or precision is FLOAT16, which have none",
             ),
         ];
         match rules.iter().find(|(is_broken, ..)| *is_broken) {
@@ -363,6 +417,12 @@ pub(super) fn stages(
         other => return Err(unknown("projectionMode", &other)),
     }
     if has_fragment_stage(info) {
+        let inputs = &gaussian.resolve_input_locations;
+        let indices = [inputs.median_gaussian, inputs.nearest_gaussian];
+        if indices != [GAUSSIAN_LOCATION_UNUSED_GAURAST; 2] {
+            let what = "medianGaussian or nearestGaussian is used";
+            require(features, RESOLVE_INDICES, what)?;
+        }
         let what = "the pipeline has a fragment stage";
         require(features, RESOLVE_FRAGMENT_SHADER, what)?;
     }
@@ -591,8 +651,42 @@ pub(super) fn fixed_state(info: &GraphicsState, features: &Features) -> Result<(
     Ok(())
 }
 
-/// Validates and converts the structure of approximations in the chain, if there is one, except for its dynamic
-/// members.
+/// Validates and converts the chain's structure of footprints, if it has one.
+pub(super) fn footprint(
+    info: &GraphicsState,
+    features: &Features,
+) -> Result<GaussianFootprint, Error> {
+    let Some(given) = info.footprint else {
+        return Ok(GaussianFootprint::default());
+    };
+    let cut_off = values::cut_off(given.cut_off).ok_or_else(|| {
+        Error::usage(
+            "VUID-VkPipelineGaussianFootprintStateCreateInfoGAURAST-cutOff-parameter",
+            format!("cutOff has the unknown value {:?}", given.cut_off),
+        )
+    })?;
+    if cut_off != GaussianCutOff::None {
+        require(features, CUT_OFF, "cutOff is not NONE")?;
+        values::CUT_OFF_DEVIATIONS.check(
+            given.cut_off_deviations,
+            "VUID-VkPipelineGaussianFootprintStateCreateInfoGAURAST-cutOffDeviations-90076",
+        )?;
+    }
+    values::COMPENSATION_FLOOR.check(
+        given.compensation_floor,
+        "VUID-VkPipelineGaussianFootprintStateCreateInfoGAURAST-compensationFloor-90077",
+    )?;
+    if given.compensation_floor != 0.0 {
+        require(features, COMPENSATION_FLOOR, "compensationFloor is not 0")?;
+    }
+    Ok(GaussianFootprint {
+        cut_off,
+        deviations: given.cut_off_deviations,
+        compensation_floor: given.compensation_floor,
+    })
+}
+
+/// Validates and converts the chain's structure of approximations, if it has one, as far as it is not dynamic.
 pub(super) fn approximation(info: &GraphicsState) -> Result<GaussianApproximation, Error> {
     use vk::DynamicState as S;
     let given = info.approximation.unwrap_or_default();

@@ -1,8 +1,8 @@
 //! The values of a Gaussian pipeline's state that a command may set, too: their conversion, and their rules.
 
 use crate::abi::error::Error;
-use gaurast::vk::{GaussianAntialiasingGAURAST, GaussianOrderGAURAST};
-use simdevice::state::gaussian::GaussianOrder;
+use gaurast::vk::{GaussianAntialiasingGAURAST, GaussianCutOffGAURAST, GaussianOrderGAURAST};
+use simdevice::state::gaussian::{GaussianCutOff, GaussianOrder};
 
 /// The order of a value; None if the value is unknown.
 pub(crate) fn order(value: GaussianOrderGAURAST) -> Option<GaussianOrder> {
@@ -24,7 +24,18 @@ pub(crate) fn is_compensated(value: GaussianAntialiasingGAURAST) -> Option<bool>
     }
 }
 
-/// The rule of a number's range.
+/// The cut-off of a value, if it is one.
+pub(super) fn cut_off(value: GaussianCutOffGAURAST) -> Option<GaussianCutOff> {
+    match value {
+        GaussianCutOffGAURAST::NONE => Some(GaussianCutOff::None),
+        GaussianCutOffGAURAST::ELLIPSE => Some(GaussianCutOff::Ellipse),
+        GaussianCutOffGAURAST::TILE_SQUARE => Some(GaussianCutOff::TileSquare),
+        GaussianCutOffGAURAST::TILE_RECTANGLE => Some(GaussianCutOff::TileRectangle),
+        _ => None,
+    }
+}
+
+/// The rule of a number.
 pub(crate) struct Rule {
     name: &'static str,
     holds: fn(f32) -> bool,
@@ -60,6 +71,17 @@ pub(crate) const EXPONENTIAL_ERROR: Rule = Rule {
 };
 pub(crate) const CONTRIBUTION_BUDGET: Rule = Rule {
     name: "contributionBudget",
+    holds: |value| (0.0..=1.0).contains(&value),
+    must_be: "at least 0 and at most 1",
+};
+
+pub(super) const CUT_OFF_DEVIATIONS: Rule = Rule {
+    name: "cutOffDeviations",
+    holds: |value| value > 0.0 && value.is_finite(),
+    must_be: "finite and greater than 0, since there is a cut-off",
+};
+pub(super) const COMPENSATION_FLOOR: Rule = Rule {
+    name: "compensationFloor",
     holds: |value| (0.0..=1.0).contains(&value),
     must_be: "at least 0 and at most 1",
 };

@@ -6,6 +6,7 @@ mod given_files;
 #[cfg(target_os = "linux")]
 mod interruptions;
 mod renderer;
+mod renderers;
 mod tasks;
 
 fn main() -> std::process::ExitCode {

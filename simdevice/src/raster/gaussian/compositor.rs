@@ -32,6 +32,7 @@ use super::inputs::{
     NO_DEPTH, Thresholds, TileCounts, TileInputs,
 };
 use super::per_pixel::{PerPixel, composite_per_pixel};
+use super::tracking::{Tracked, Tracking};
 use crate::gaussian::BinnedDraw;
 use crate::gaussian::depth::DepthTrend;
 use crate::gaussian::tile_lists::SortedWalk;
@@ -39,7 +40,7 @@ use crate::limits::{MAX_SAMPLES, TILE_SIZE};
 use crate::stats::counters::{Counter, Counters};
 use crate::stats::optimizations::{Optimization, Optimizations};
 use crate::stats::recorder::{Run, TileWork};
-use devmem::dispatch;
+use devmem::{dispatch, host};
 use fearless_simd::Level;
 
 /// Primitives of a piece of a sorted walk. The fast kernel goes on where it was, so that pieces change no bit.
@@ -57,6 +58,8 @@ pub struct GaussianTile {
     /// Of the kernels that part lists by blocks.
     lists: BlockLists,
     per_pixel: PerPixel,
+    /// By accumulator, what a fragment program reads of Gaussians, if it does.
+    pub(super) tracked: Vec<Tracked>,
     /// A piece of a tile's list, where the draw has none.
     piece: Vec<u32>,
 }
@@ -69,6 +72,7 @@ impl Default for GaussianTile {
             fast: FastScratch::default(),
             lists: Default::default(),
             per_pixel: PerPixel::default(),
+            tracked: Vec::new(),
             piece: Vec::new(),
         }
     }
@@ -106,6 +110,9 @@ impl GaussianTile {
         to.clear(lanes);
         if DEPTH == FIND_MEAN {
             to.clear_means();
+            if draw.identities().is_some() {
+                self.clear_tracked(accumulator);
+            }
         }
         if list.is_empty() && draw.sorted.tiles.walk().is_none() {
             return;
@@ -156,6 +163,14 @@ impl GaussianTile {
         let saturated = blocks - work.open - work.blocks_left_out;
         counters.add(Counter::BlocksSaturated, saturated);
         counters.add(Counter::PixelContributions, work.contributions);
+    }
+
+    /// Makes what is tracked of an accumulator's pixels fresh.
+    fn clear_tracked(&mut self, accumulator: usize) {
+        if self.tracked.len() <= accumulator {
+            host::resize(&mut self.tracked, accumulator + 1, Tracked::EMPTY);
+        }
+        self.tracked[accumulator] = Tracked::EMPTY;
     }
 
     /// Which of `lanes` some Gaussian of `draw` reaches with an alpha of the floor or more, whatever its depth.
@@ -247,6 +262,16 @@ impl GaussianTile {
         match task.mode {
             Kernel::Half => {
                 let kernel = Half::new(&task.thresholds);
+                dispatch!(level, simd => composite_by_block(simd, kernel, task, lists, to, runs))
+            }
+            Kernel::Exact {
+                identities: Some(identities),
+                ..
+            } => {
+                let Some(tracked) = self.tracked.get_mut(accumulator) else {
+                    return TileCounts::default();
+                };
+                let kernel = Tracking::new(identities, tracked);
                 dispatch!(level, simd => composite_by_block(simd, kernel, task, lists, to, runs))
             }
             Kernel::Exact {

@@ -14,7 +14,7 @@ use super::grid::{BLOCK_PIXELS, BLOCK_X, BLOCK_Y, LANE_X_64, LANE_Y_64};
 use super::inputs::{FIND_MEAN, FIND_MEDIAN, Kernel, NO_DEPTH, Thresholds, TileInputs};
 use super::pixels::{accumulate, falls_64};
 use crate::simd::exp2::exp2_of_negated;
-use fearless_simd::{Simd, f32x16, f64x8, mask64x8, prelude::*};
+use fearless_simd::{Simd, f32x16, f64x8, mask32x16, mask64x8, prelude::*};
 
 /// What the pixels of a block accumulate; signs of transmittances as in [`Accumulator`].
 #[derive(Clone, Copy)]
@@ -207,9 +207,28 @@ fn accumulate_wide<S: Simd>(
     u64::from(accepted.count_ones())
 }
 
+/// How far alpha has fallen where a Gaussian is cut off: farther than any contributes.
+const CUT: f32 = 1e3;
+
 /// How far a primitive's alpha has fallen at a block's pixels.
 #[inline(always)]
 pub(super) fn falls<S: Simd>(
+    simd: S,
+    task: &TileInputs<'_>,
+    (batch, place): (usize, usize),
+    block: usize,
+) -> f32x16<S> {
+    let fall = whole_falls(simd, task, (batch, place), block);
+    let Some(cut_off) = task.mode.cut_off() else {
+        return fall;
+    };
+    let lanes = cut_off.lanes(&task.splats[batch][place], task.corner, block);
+    mask32x16::from_bitmask(simd, lanes.into()).select(fall, f32x16::splat(simd, CUT))
+}
+
+/// As [`falls`], of a primitive that is not cut off.
+#[inline(always)]
+fn whole_falls<S: Simd>(
     simd: S,
     task: &TileInputs<'_>,
     (batch, place): (usize, usize),

@@ -7,6 +7,7 @@
 use super::compositor::GaussianTile;
 use super::grid::{BLOCK_PIXELS, BLOCK_X, BLOCK_Y, BLOCKS, LANE_X, LANE_Y, PixelMask};
 use super::samples::{SAMPLES, Samples};
+use super::tracking::Tracked;
 use crate::gaussian::BinnedDraw;
 use crate::limits::TILE_SIZE;
 use crate::packet::GaussianFragmentStage;
@@ -18,6 +19,7 @@ use crate::raster::output::{Buffers, Sources, Targets, color_outputs, covered_by
 use crate::raster::tile::{CENTER, SAMPLES_4, Tile};
 use crate::raster::tile_buffer::QuadAddresses;
 use crate::runtime::Runtime;
+use crate::state::gaussian::CameraModel;
 use crate::stats::counters::{Counter, Counters};
 use devmem::dispatch;
 use fearless_simd::{Level, Simd, f32x16, prelude::*};
@@ -85,6 +87,11 @@ impl<'a> FragmentStageDraw<'a> {
     /// Whether the program reads depths.
     pub(super) fn reads_depth(&self) -> bool {
         self.shader.program.reads_depth
+    }
+
+    /// Whether the program reads which Gaussians there are, or depth variables.
+    pub(super) fn is_tracking(&self) -> bool {
+        self.shader.program.is_tracking
     }
 
     /// Whether what it discards was tested and counted already.
@@ -241,13 +248,25 @@ impl<'a> FragmentStageDraw<'a> {
             _ => CENTER[0],
         };
         let bits = |lanes: [f32; BLOCK_PIXELS]| lanes.map(f32::to_bits);
+        let of_gaussians = |index: u32| {
+            let number = samples.accumulators[group.leader][block];
+            let tracked = tools
+                .fragments
+                .tracked
+                .get(number)
+                .filter(|_| self.is_tracking());
+            tracked.map_or([0; BLOCK_PIXELS], |tracked| {
+                self.tracked_input(tracked, accumulator.covered[block], block, index)
+            })
+        };
         for &(slot, input, _) in &self.stage.interface.inputs {
             let value = match input {
                 FragmentInput::Varying { index, .. } => match index {
                     0..4 => bits(accumulated[index as usize]),
                     resolve::EXPECTED_DEPTH => bits(depths[0]),
                     resolve::MEDIAN_DEPTH => bits(depths[1]),
-                    _ => [0; BLOCK_PIXELS],
+                    resolve::EXPECTED_LINEAR_DEPTH..resolve::CAMERA => of_gaussians(index),
+                    _ => [self.camera_input(index).to_bits(); BLOCK_PIXELS],
                 },
                 FragmentInput::FragCoord(axis @ (0 | 1)) => {
                     let (middle, lanes) = if axis == 0 {
@@ -284,6 +303,69 @@ impl<'a> FragmentStageDraw<'a> {
             if let Some(chunk) = machine.input_mut(slot).get_mut(number) {
                 *chunk = Vector(value);
             }
+        }
+    }
+
+    /// What a block's lanes read of the Gaussians that they show; zeros where nothing is covered.
+    fn tracked_input(
+        &self,
+        tracked: &Tracked,
+        covered: u32,
+        block: usize,
+        index: u32,
+    ) -> [u32; BLOCK_PIXELS] {
+        let located = |sequences: &[u32; BLOCK_PIXELS], lane: usize, part: u32| {
+            let origins = self.draw.origins.as_ref();
+            let place = origins.map_or([0; 2], |origins| origins.locate(sequences[lane]));
+            place[usize::from(part != 0)]
+        };
+        let value = |lane: usize| match index {
+            resolve::EXPECTED_LINEAR_DEPTH => tracked.linear[0][block][lane].to_bits(),
+            resolve::MEDIAN_LINEAR_DEPTH => tracked.linear[1][block][lane].to_bits(),
+            resolve::MEDIAN_GAUSSIAN..resolve::NEAREST_GAUSSIAN => {
+                let part = index - resolve::MEDIAN_GAUSSIAN;
+                located(&tracked.median[block], lane, part)
+            }
+            _ => {
+                let part = index - resolve::NEAREST_GAUSSIAN;
+                located(&tracked.nearest[block], lane, part)
+            }
+        };
+        std::array::from_fn(|lane| {
+            if covered >> lane & 1 == 1 {
+                value(lane)
+            } else {
+                0
+            }
+        })
+    }
+
+    /// A number of those that the camera is.
+    fn camera_input(&self, index: u32) -> f32 {
+        let number = index.wrapping_sub(resolve::CAMERA) as usize;
+        let camera = &self.draw.camera;
+        let row = |row: usize| &camera.rotation[3 * row..][..3];
+        let [fx, fy] = camera.focal_length;
+        let [cx, cy] = camera.principal_point;
+        let [c0, c1] = camera.depth_coefficients;
+        let part = number % 4;
+        match number / 4 {
+            at @ 0..3 if part < 3 => row(at)[part],
+            at @ 0..3 => {
+                let products = row(at).iter().zip(camera.eye);
+                let sum: f64 = products.map(|(&r, eye)| f64::from(r) * eye).sum();
+                -sum as f32
+            }
+            3 => [fx, fy, cx, cy][part],
+            4 => [c0, c1, camera.near_plane, camera.far_plane][part],
+            5 if part < 3 => camera.eye[part] as f32,
+            5 => match camera.model {
+                CameraModel::Pinhole => 0.0,
+                CameraModel::Orthographic => 1.0,
+                CameraModel::Fisheye => 2.0,
+                CameraModel::Equirectangular => 3.0,
+            },
+            _ => 0.0,
         }
     }
 

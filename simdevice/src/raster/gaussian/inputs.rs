@@ -10,9 +10,11 @@
 //! a sum for each block and a bound of each Gaussian's alpha in it; that took as long as it saved.)
 
 use super::accumulator::{NOT_TERMINATED, TransmittanceBits};
+use super::cut_off::CutOff;
 use crate::format::depth::DepthEncoding;
 use crate::gaussian::BinnedDraw;
 use crate::gaussian::depth::DepthTrend;
+use crate::gaussian::identity::Identity;
 use crate::gaussian::ray_depth::RayDepths;
 use crate::gaussian::splat::{Splat, locate};
 use crate::gaussian::surfel::Surfel;
@@ -92,15 +94,23 @@ pub(super) enum Kernel<'a> {
         depths: Option<RayDepths<'a>>,
         /// Whether sums are kept in binary64 where the order is the list's; each pixel's own order always does so.
         wide_sums: bool,
+        /// The shape outside which nothing contributes, if there is one.
+        cut_off: Option<CutOff>,
+        /// By batch, as the splats, if which they are is tracked. They are in the order of the list then.
+        identities: Option<&'a [Vec<Identity>]>,
     },
 }
 
 impl<'a> Kernel<'a> {
     pub(super) fn of(draw: &'a BinnedDraw) -> Self {
         let (surfels, depths) = (draw.surfels(), draw.ray_depths());
+        let cut_off = CutOff::of(draw).filter(|_| !draw.are_lists_cut);
+        let identities = draw.identities();
+        let is_plain = cut_off.is_none() && identities.is_none();
         if draw.state.precision == GaussianPrecision::Float16 {
             Self::Half
-        } else if surfels.is_none() && depths.is_none() && !needs_f64_sums(&draw.state) {
+        } else if surfels.is_none() && depths.is_none() && is_plain && !needs_f64_sums(&draw.state)
+        {
             Self::Fast
         } else {
             let variance = f64::from(draw.state.low_pass_variance);
@@ -109,25 +119,38 @@ impl<'a> Kernel<'a> {
                 inverse_low_pass: (variance > 0.0).then(|| 1.0 / variance),
                 depths,
                 wide_sums: needs_f64_sums(&draw.state),
+                cut_off,
+                identities,
             }
         }
     }
 
-    /// The same, but that pixels take the list's order.
+    /// The same, but that pixels take the list's order, and nothing is tracked.
     pub(super) fn in_list_order(self) -> Self {
         match self {
             Self::Exact {
                 surfels,
                 inverse_low_pass,
                 wide_sums,
+                cut_off,
                 ..
             } => Self::Exact {
                 surfels,
                 inverse_low_pass,
                 depths: None,
                 wide_sums,
+                cut_off,
+                identities: None,
             },
             other => other,
+        }
+    }
+
+    /// The shape outside which nothing contributes, if there is one.
+    pub(super) fn cut_off(&self) -> Option<&CutOff> {
+        match self {
+            Self::Exact { cut_off, .. } => cut_off.as_ref(),
+            Self::Fast | Self::Half => None,
         }
     }
 

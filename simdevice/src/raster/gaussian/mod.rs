@@ -8,6 +8,7 @@ mod accumulator;
 mod binary16;
 mod block_lists;
 mod compositor;
+mod cut_off;
 mod depth_ranges;
 mod exact;
 mod fast;
@@ -19,6 +20,7 @@ mod per_pixel;
 mod pixels;
 mod samples;
 mod staging;
+mod tracking;
 
 pub use compositor::GaussianTile;
 
@@ -126,12 +128,12 @@ impl<'a> GaussianTileDraw<'a> {
             buffers.stencil.load_or_clear(target, self.draw.layer, tile);
         }
         let mut samples = self.test_first(tile, buffers);
-        let reads_depth = self
-            .resolve
-            .as_ref()
-            .is_some_and(FragmentStageDraw::reads_depth);
+        let reads_more = self.resolve.as_ref().is_some_and(|resolve| {
+            // Whatever else a program reads of the Gaussians goes with their mean.
+            resolve.reads_depth() || resolve.is_tracking()
+        });
         match self.tests.depth {
-            _ if reads_depth => {
+            _ if reads_more => {
                 self.composite::<FIND_MEAN>(tile, &mut samples, buffers, fragments, counters);
             }
             None => self.composite::<NO_DEPTH>(tile, &mut samples, buffers, fragments, counters),

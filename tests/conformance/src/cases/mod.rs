@@ -2,9 +2,11 @@
 
 mod attachments;
 mod chapter;
+mod footprint;
 mod input;
 mod modes;
 mod numerics;
+mod resolve;
 mod scenes;
 
 pub use chapter::Case;
@@ -12,8 +14,8 @@ use chapter::Chapter;
 
 type Write = fn(&mut Chapter<'_>);
 
-/// The chapters in order.
-const CHAPTERS: [(&str, Write); 15] = [
+/// The chapters in their order.
+const CHAPTERS: [(&str, Write); 17] = [
     ("topology", input::topology),
     ("attributes", input::attributes),
     ("instances", input::instances),
@@ -25,6 +27,8 @@ const CHAPTERS: [(&str, Write); 15] = [
     ("harmonics", modes::harmonics),
     ("binary16", modes::binary16),
     ("approximation", modes::approximation),
+    ("footprint", footprint::footprint),
+    ("resolve", resolve::resolve),
     ("depth", attachments::depth),
     ("stencil", attachments::stencil),
     ("interactions", attachments::interactions),

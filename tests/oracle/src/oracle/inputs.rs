@@ -2,7 +2,8 @@
 
 use gaurast::vk::{
     GaussianAntialiasingGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST,
-    GaussianGeometryGAURAST, GaussianLinearizationGAURAST, GaussianOrderGAURAST,
+    GaussianCutOffGAURAST, GaussianGeometryGAURAST, GaussianLinearizationGAURAST,
+    GaussianOrderGAURAST, PipelineGaussianFootprintStateCreateInfoGAURAST,
     PipelineGaussianStateCreateInfoGAURAST,
 };
 
@@ -127,6 +128,20 @@ pub enum OracleOrder {
     PerPixel,
 }
 
+/// The shape outside which a Gaussian does not contribute.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum OracleCutOff {
+    /// There is none.
+    #[default]
+    None,
+    /// The ellipse of a Mahalanobis distance.
+    Ellipse,
+    /// The tiles that a square touches.
+    TileSquare,
+    /// The tiles that a rectangle touches.
+    TileRectangle,
+}
+
 /// A camera and the viewport that it fills, as `VkGaussianCameraGAURAST` holds them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OracleCamera {
@@ -169,6 +184,42 @@ pub struct OracleState {
     pub geometry: OracleGeometry,
     /// The order of Gaussians.
     pub order: OracleOrder,
+    /// The shape outside which they do not contribute.
+    pub cut_off: OracleCutOff,
+    /// Its size in standard deviations.
+    pub cut_off_deviations: f32,
+    /// The least ratio of determinants that compensation takes the root of.
+    pub compensation_floor: f32,
+}
+
+impl OracleState {
+    /// The same with a pipeline's structure of footprints.
+    #[must_use]
+    pub fn with_footprint(
+        self,
+        footprint: &PipelineGaussianFootprintStateCreateInfoGAURAST<'_>,
+    ) -> Self {
+        Self {
+            cut_off: match footprint.cut_off {
+                GaussianCutOffGAURAST::ELLIPSE => OracleCutOff::Ellipse,
+                GaussianCutOffGAURAST::TILE_SQUARE => OracleCutOff::TileSquare,
+                GaussianCutOffGAURAST::TILE_RECTANGLE => OracleCutOff::TileRectangle,
+                _ => OracleCutOff::None,
+            },
+            cut_off_deviations: footprint.cut_off_deviations,
+            compensation_floor: footprint.compensation_floor,
+            ..self
+        }
+    }
+
+    /// The factor of the opacity, and the root of the determinant whose error it has, if opacity is compensated. `area` is the
+    /// root of the determinant before the low-pass.
+    pub(super) fn compensation(&self, area: f64, determinant: f64) -> Option<[f64; 2]> {
+        let floor = f64::from(self.compensation_floor);
+        let area = area.max((floor * determinant).sqrt());
+        self.opacity_compensated
+            .then(|| [area / determinant.sqrt(), area])
+    }
 }
 
 impl Default for OracleState {
@@ -182,6 +233,9 @@ impl Default for OracleState {
             unscented: false,
             geometry: OracleGeometry::Volume,
             order: OracleOrder::ViewDepth,
+            cut_off: OracleCutOff::None,
+            cut_off_deviations: 0.0,
+            compensation_floor: 0.0,
         }
     }
 }
@@ -249,6 +303,9 @@ impl From<&PipelineGaussianStateCreateInfoGAURAST<'_>> for OracleState {
                 GaussianOrderGAURAST::PER_PIXEL => OracleOrder::PerPixel,
                 _ => OracleOrder::ViewDepth,
             },
+            cut_off: OracleCutOff::None,
+            cut_off_deviations: 0.0,
+            compensation_floor: 0.0,
         }
     }
 }

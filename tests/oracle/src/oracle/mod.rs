@@ -10,7 +10,7 @@
 //! | 3, 4 | mean, covariance, determinant, opacity compensation | [`project`] |
 //! | 1 to 5 | the same for outputs of a vertex shader | [`shaded`] |
 //! | 5 | colour from spherical harmonics | [`spherical_harmonics`] |
-//! | 6 | alpha at a pixel centre | [`splat`] |
+//! | 6 | alpha at a pixel centre, and where it is cut off | [`splat`] |
 //! | 7 | compositing front to back | [`pixel`] |
 //! | 6, 7 | the same in binary16 | [`render_binary16`] |
 //! | 7 | the per-pixel order | [`rays`], [`own_axes`] |
@@ -46,6 +46,7 @@
 
 pub mod activation;
 mod binary16;
+mod cut_off;
 pub mod error_model;
 mod inputs;
 mod instance;
@@ -71,8 +72,8 @@ mod tests;
 
 pub use binary16::render_binary16;
 pub use inputs::{
-    OracleCamera, OracleGeometry, OracleInstance, OracleModel, OracleOrder, OracleScene,
-    OracleState,
+    OracleCamera, OracleCutOff, OracleGeometry, OracleInstance, OracleModel, OracleOrder,
+    OracleScene, OracleState,
 };
 pub use pixel::MAX_DECISIONS;
 pub use render::{Reference, render_bounded, render_literal};

@@ -7,10 +7,18 @@ use super::splat::{Alpha, Splat};
 /// The number of undecidable decisions that are followed both ways along one path. Later ones follow binary64.
 pub const MAX_DECISIONS: u32 = 6;
 
-/// The possible depth variables of a pixel's median.
+/// A Gaussian that may be a pixel's median.
+#[derive(Clone, Copy, Debug, Default)]
+struct Median {
+    z: f32,
+    distance: f32,
+    index: usize,
+}
+
+/// Gaussians, one of which is a pixel's median.
 #[derive(Clone, Copy, Debug, Default)]
 struct Medians {
-    z: [f32; MAX_MEDIANS],
+    of: [Median; MAX_MEDIANS],
     count: usize,
     /// True if there are more than are kept.
     exhausted: bool,
@@ -21,18 +29,17 @@ struct Medians {
 const MAX_MEDIANS: usize = 4;
 
 impl Medians {
-    /// Adds a Gaussian that contributes where the transmittance is `before`. It is the median candidate unless less
-    /// than one half is left.
-    fn add(&mut self, z: f32, before: Transmittance) {
+    /// A Gaussian contributes where `before` is left; it is the median unless less than one half is.
+    fn add(&mut self, median: Median, before: Transmittance) {
         if before.value + before.error < 0.5 {
             return;
         }
         if before.value - before.error >= 0.5 {
             self.count = 0;
         }
-        match self.z.get_mut(self.count) {
+        match self.of.get_mut(self.count) {
             Some(slot) => {
-                *slot = z;
+                *slot = median;
                 self.count += 1;
             }
             None => self.exhausted = true,
@@ -53,6 +60,12 @@ pub struct Outcome {
     pub medians_exhausted: bool,
     /// The sums of weighted depths and of weights.
     pub depths: [f64; 2],
+    /// The sum of weighted depth variables.
+    pub distances: f64,
+    /// The first Gaussian that contributed, by its place in primitive order, if one did.
+    pub nearest: Option<usize>,
+    /// Places in primitive order of Gaussians that the median may be, as `medians`, and their depth variables.
+    pub median_gaussians: Vec<(usize, f32)>,
 }
 
 /// One sequence of decisions at a pixel, and its result so far.
@@ -62,7 +75,9 @@ struct Path {
     transmittance: Transmittance,
     covered: bool,
     medians: Medians,
+    nearest: Option<usize>,
     depths: [f64; 2],
+    distances: f64,
     finished: bool,
     /// Undecidable decisions taken so far, each of which was followed both ways.
     decisions: u32,
@@ -74,22 +89,34 @@ impl Path {
         transmittance: Transmittance::ONE,
         covered: false,
         medians: Medians {
-            z: [0.0; MAX_MEDIANS],
+            of: [Median {
+                z: 0.0,
+                distance: 0.0,
+                index: 0,
+            }; MAX_MEDIANS],
             count: 0,
             exhausted: false,
         },
+        nearest: None,
         depths: [0.0; 2],
+        distances: 0.0,
         finished: false,
         decisions: 0,
     };
 
     fn outcome(&self) -> Outcome {
+        let medians = &self.medians.of[..self.medians.count];
         Outcome {
             rgba: self.rgba(),
             covered: self.covered,
-            medians: self.medians.z[..self.medians.count].to_vec(),
+            medians: medians.iter().map(|median| median.z).collect(),
             medians_exhausted: self.medians.exhausted,
             depths: self.depths,
+            distances: self.distances,
+            nearest: self.nearest,
+            median_gaussians: (medians.iter())
+                .map(|median| (median.index, median.distance))
+                .collect(),
         }
     }
 
@@ -125,12 +152,17 @@ impl Pixel {
 
     /// Adds the next Gaussian by ascending depth.
     pub fn add(&mut self, splat: &Splat, alpha: Alpha, state: &OracleState) {
-        if alpha.value + alpha.error < f64::from(state.alpha_floor) {
+        let is_faint = alpha.value + alpha.error < f64::from(state.alpha_floor);
+        if is_faint || alpha.is_certainly_cut() {
             return;
         }
         let mut step = Step {
             color: splat.color,
-            z: splat.z,
+            median: Median {
+                z: splat.z,
+                distance: splat.distance,
+                index: splat.index,
+            },
             depth: splat.depth,
             alpha,
             state,
@@ -183,7 +215,7 @@ impl Pixel {
 /// One Gaussian being added to all paths of a pixel.
 struct Step<'a> {
     color: [f64; 3],
-    z: f32,
+    median: Median,
     depth: f64,
     alpha: Alpha,
     state: &'a OracleState,
@@ -193,16 +225,25 @@ struct Step<'a> {
 }
 
 impl Step<'_> {
-    /// Step 6's decision: `alpha >= alphaFloor`.
+    /// Step 6's decisions: `alpha >= alphaFloor`, and that it is not cut off.
     fn contribute_or_not(&mut self, path: &mut Path) {
         if path.finished {
             return;
         }
         let floor = f64::from(self.state.alpha_floor);
-        let Alpha { value, error } = self.alpha;
-        let contributes = value >= floor;
-        // With a floor of 0 no alpha is below it, whatever its error.
-        let undecidable = floor > 0.0 && (value - floor).abs() < error;
+        let Alpha {
+            value,
+            error,
+            is_cut,
+            cut_undecidable,
+        } = self.alpha;
+        let contributes = value >= floor && !is_cut;
+        // No alpha is below a floor of 0, whatever its error.
+        let at_floor = floor > 0.0 && (value - floor).abs() < error;
+        if value < floor && !at_floor {
+            return;
+        }
+        let undecidable = at_floor || cut_undecidable;
         if let Some(mut other) = self.part(path, undecidable) {
             if !contributes {
                 self.finish_or_blend(&mut other);
@@ -247,8 +288,10 @@ impl Step<'_> {
         }
         path.depths[0] += weight * self.depth;
         path.depths[1] += weight;
+        path.distances += weight * f64::from(self.median.distance);
+        path.nearest = path.nearest.or(Some(self.median.index));
         path.covered = true;
-        path.medians.add(self.z, path.transmittance);
+        path.medians.add(self.median, path.transmittance);
         path.transmittance = behind;
     }
 

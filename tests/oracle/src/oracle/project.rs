@@ -91,8 +91,9 @@ pub fn project(
     }
     let covariance = [s_xx + low_pass, s_xy, s_yy + low_pass];
     let mut opacity = f64::from(scene.opacity(index));
-    if state.opacity_compensated {
-        opacity *= area / determinant.sqrt();
+    let compensation = state.compensation(area, determinant);
+    if let Some([factor, _]) = compensation {
+        opacity *= factor;
     }
 
     // Step 5. Colour.
@@ -111,8 +112,9 @@ pub fn project(
             .map(|row| dot(row.map(f64::abs), position.map(f64::abs)));
         4.0 * f64::EPSILON * (length(terms) + length(model.translation) + length(camera.eye))
     };
-    let area_for_opacity = state.opacity_compensated.then_some(area);
+    let area_for_opacity = compensation.map(|[_, area]| area);
     Ok(Splat {
+        index,
         mean,
         covariance,
         determinant,
@@ -122,6 +124,7 @@ pub fn project(
         color,
         key: sort_by as f32,
         z,
+        distance: z,
         depth: 0.0,
         surfel: is_flat.then(|| Surfel {
             camera: *camera,

@@ -221,9 +221,9 @@ impl Projected {
     pub(super) fn sort(all: impl Iterator<Item = Result<Splat, SkipReason>>) -> Self {
         let mut skips = SkipCounts::default();
         let mut splats = Vec::new();
-        for one in all {
+        for (index, one) in all.enumerate() {
             match one {
-                Ok(splat) => splats.push(splat),
+                Ok(splat) => splats.push(Splat { index, ..splat }),
                 Err(reason) => skips.count(reason),
             }
         }

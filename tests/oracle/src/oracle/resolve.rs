@@ -21,6 +21,12 @@ pub struct Resolved {
     pub median_depths: Vec<f64>,
     /// True if the list of medians is incomplete.
     pub medians_exhausted: bool,
+    /// The mean of the contributing centres' depth variables, weighted by T alpha.
+    pub expected_distance: f64,
+    /// Every Gaussian that may be the median, by its place in primitive order, with its depth variable.
+    pub median_gaussians: Vec<(usize, f32)>,
+    /// The first Gaussian that contributed, by its place in primitive order.
+    pub nearest: Option<usize>,
 }
 
 impl Resolved {
@@ -28,6 +34,7 @@ impl Resolved {
         let median_depths: Vec<f64> = outcome.medians.iter().map(|&z| depth(z)).collect();
         let [depths, weights] = outcome.depths;
         let last = median_depths.last().copied().unwrap_or(0.0);
+        let last_distance = outcome.median_gaussians.last().map_or(0.0, |m| m.1.into());
         Self {
             accumulated: outcome.rgba,
             covered: outcome.covered,
@@ -38,6 +45,13 @@ impl Resolved {
             },
             median_depths,
             medians_exhausted: outcome.medians_exhausted,
+            expected_distance: if weights > 0.0 {
+                outcome.distances / weights
+            } else {
+                last_distance
+            },
+            median_gaussians: outcome.median_gaussians.clone(),
+            nearest: outcome.nearest,
         }
     }
 }

@@ -190,8 +190,9 @@ impl Sample<'_> {
     /// Notes if a Gaussian reaches the pixel at all.
     fn reach(&mut self, alpha: Alpha, state: &OracleState) {
         let floor = f64::from(state.alpha_floor);
-        self.reached[0] |= floor == 0.0 || alpha.value - alpha.error >= floor;
-        self.reached[1] |= alpha.value + alpha.error >= floor;
+        let is_whole = !alpha.is_cut && !alpha.cut_undecidable;
+        self.reached[0] |= is_whole && (floor == 0.0 || alpha.value - alpha.error >= floor);
+        self.reached[1] |= !alpha.is_certainly_cut() && alpha.value + alpha.error >= floor;
     }
 
     /// The values that it may store afterwards: depths, if known, and stencils.

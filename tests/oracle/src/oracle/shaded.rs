@@ -73,11 +73,14 @@ pub fn project(
     }
     let area = area2.max(0.0).sqrt();
     let mut opacity = f64::from(outputs.opacity);
-    if state.opacity_compensated {
-        opacity *= area / determinant.sqrt();
+    let compensation = state.compensation(area, determinant);
+    if let Some([factor, _]) = compensation {
+        opacity *= factor;
     }
-    let area_for_opacity = state.opacity_compensated.then_some(area);
+    let area_for_opacity = compensation.map(|[_, area]| area);
     Ok(Splat {
+        index: 0,
+        distance: w as f32,
         mean,
         covariance,
         determinant,

@@ -1,6 +1,7 @@
 //! A projected Gaussian, and step 6: its alpha at a pixel centre.
 
 use super::OracleState;
+use super::cut_off::{Place, is_cut};
 use super::error_model::ErrorModel;
 use super::own_axes::OwnAxes;
 use super::panorama;
@@ -9,6 +10,8 @@ use super::surfel::Surfel;
 /// A Gaussian after projection, as step 6 needs it.
 #[derive(Clone, Copy, Debug)]
 pub struct Splat {
+    /// Its place in primitive order.
+    pub index: usize,
     /// Centre in pixels from the viewport's upper left corner, not clamped to it.
     pub mean: [f64; 2],
     /// Covariance `xx, xy, yy` in px^2, low-pass filter included.
@@ -27,7 +30,9 @@ pub struct Splat {
     pub key: f32,
     /// The depth variable, rounded to binary32. (With vertex-shader projection the depth, rounded so.)
     pub z: f32,
-    /// The depth of its centre, which enters the mean depth of a pixel; zero unless the depth is needed.
+    /// The depth variable, rounded to binary32: with vertex-shader projection w.
+    pub distance: f32,
+    /// The depth of its centre, of which a pixel has a mean; zero until somebody asks for that.
     pub depth: f64,
     /// Its disc in camera axes, if it is a disc.
     pub surfel: Option<Surfel>,
@@ -84,13 +89,24 @@ pub struct Alpha {
     pub value: f64,
     /// The bound on the distance of a binary32 implementation from it.
     pub error: f64,
+    /// Whether the Gaussian is cut off there.
+    pub is_cut: bool,
+    /// Whether that could be decided otherwise.
+    pub cut_undecidable: bool,
 }
 
 impl Alpha {
     const NOTHING: Self = Self {
         value: 0.0,
         error: 0.0,
+        is_cut: false,
+        cut_undecidable: false,
     };
+
+    /// Whether it is cut off for certain.
+    pub fn is_certainly_cut(&self) -> bool {
+        self.is_cut && !self.cut_undecidable
+    }
 }
 
 impl Splat {
@@ -108,6 +124,20 @@ impl Splat {
                 (q, self.error.alpha(w, q))
             }
         };
+        let centre = [f64::from(x) + 0.5, f64::from(y) + 0.5];
+        let place = Place {
+            centre,
+            mean: [centre[0] - d[0], centre[1] - d[1]],
+            covariance: self.covariance,
+            q,
+            error: relative,
+        };
+        let (is_cut, cut_undecidable) = is_cut(&place, state);
+        let whole = Alpha {
+            is_cut,
+            cut_undecidable,
+            ..Alpha::NOTHING
+        };
         let unclamped = self.opacity * (-0.5 * q).exp();
         let error = unclamped * relative;
         let ceiling = f64::from(state.alpha_ceiling);
@@ -115,16 +145,19 @@ impl Splat {
             Alpha {
                 value: ceiling,
                 error: 0.0,
+                ..whole
             }
         } else if unclamped > ceiling {
             Alpha {
                 value: ceiling,
                 error,
+                ..whole
             }
         } else {
             Alpha {
                 value: unclamped,
                 error,
+                ..whole
             }
         }
     }

@@ -1,0 +1,60 @@
+//! Other renderers, whose pictures of a scene are asked for.
+
+use clap::ValueEnum;
+use gaurast_render::{Antialiasing, CutOff, Order, Settings};
+
+/// Values of `--as`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum OtherRenderer {
+    /// 3DGS's own (diff-gaussian-rasterization): tiles of a square of 3 standard deviations, from 0.2 on
+    Inria,
+    /// gsplat's: tiles of a rectangle of 3.33 standard deviations, alphas of up to 0.999, from 0.01 on
+    Gsplat,
+    /// What KHR_gaussian_splatting says: an ellipse of 3 standard deviations, by distance from the camera
+    Gltf,
+}
+
+impl OtherRenderer {
+    /// The order in which it composites.
+    pub fn order(self) -> Order {
+        match self {
+            Self::Inria | Self::Gsplat => Order::Depth,
+            Self::Gltf => Order::Distance,
+        }
+    }
+
+    /// Its near plane, if it has one of its own.
+    pub fn near(self) -> Option<f64> {
+        match self {
+            Self::Inria => Some(0.2),
+            Self::Gsplat => Some(0.01),
+            Self::Gltf => None,
+        }
+    }
+
+    /// The settings by which its pictures are drawn. All of them dilate by 0.3 px^2, leave out alphas below 1/255, and
+    /// finish pixels at 0.0001.
+    pub fn settings(self, settings: Settings) -> Settings {
+        let (cut_off, cut_off_deviations) = match self {
+            Self::Inria => (CutOff::TileSquare, 3.0),
+            Self::Gsplat => (CutOff::TileRectangle, 3.33),
+            Self::Gltf => (CutOff::Ellipse, 3.0),
+        };
+        let is_compensated = settings.antialiasing == Antialiasing::Compensated;
+        Settings {
+            alpha_floor: 1.0 / 255.0,
+            alpha_ceiling: match self {
+                Self::Gsplat => 0.999,
+                Self::Inria | Self::Gltf => 0.99,
+            },
+            transmittance_floor: 1e-4,
+            cut_off,
+            cut_off_deviations,
+            compensation_floor: match self {
+                Self::Inria if is_compensated => 0.000_025,
+                _ => 0.0,
+            },
+            ..settings
+        }
+    }
+}

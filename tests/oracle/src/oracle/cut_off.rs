@@ -1,0 +1,86 @@
+//! Cut-offs: the shapes outside which a Gaussian does not contribute, whatever its alpha.
+//!
+//! Each is a comparison that binary32 may decide otherwise near the shape's edge. Granted are 16 units of roundoff of the
+//! radius before it is rounded up, as many of the magnitudes that a side of a box is a sum of, and the error that alpha has,
+//! of the ellipse.
+
+use super::error_model::UNIT_ROUNDOFF;
+use super::{OracleCutOff, OracleState};
+
+/// Pixels along a tile's side.
+const TILE: f64 = 16.0;
+
+/// The least square of half the difference of the eigenvalues that a square is found of, in px^4.
+const LEAST_SPREAD: f64 = 0.1;
+
+/// Relative error of radii and sides.
+const ERROR: f64 = 16.0 * UNIT_ROUNDOFF;
+
+/// The place of a pixel's centre about a Gaussian.
+pub(super) struct Place {
+    /// The centre, in pixels from the corner of the viewport.
+    pub(super) centre: [f64; 2],
+    /// The mean of the Gaussian, or of its copy that counts there.
+    pub(super) mean: [f64; 2],
+    /// The covariance xx, xy, yy.
+    pub(super) covariance: [f64; 3],
+    /// The quadratic form there.
+    pub(super) q: f64,
+    /// The relative error of alpha there.
+    pub(super) error: f64,
+}
+
+/// Tells if a Gaussian is cut off at a pixel, and if that could be decided otherwise.
+pub(super) fn is_cut(place: &Place, state: &OracleState) -> (bool, bool) {
+    let k = f64::from(state.cut_off_deviations);
+    match state.cut_off {
+        OracleCutOff::None => (false, false),
+        OracleCutOff::Ellipse => {
+            let most = k * k;
+            // An error of the exponent q / 2 is a relative one of alpha.
+            let near = (place.q - most).abs() <= 2.0 * place.error + ERROR * most;
+            (place.q > most, near)
+        }
+        OracleCutOff::TileSquare | OracleCutOff::TileRectangle => {
+            let is_within = |slack: f64| {
+                let boxed = boxed(place, state, slack);
+                [0, 1].iter().all(|&axis| {
+                    let tile = (place.centre[axis] / TILE).floor();
+                    let [first, end] = boxed[axis];
+                    first <= tile && tile < end
+                })
+            };
+            (!is_within(0.0), is_within(-1.0) != is_within(1.0))
+        }
+    }
+}
+
+/// The first tile and the one after the last along x and y, of a box whose sides are moved out by `slack` times their error.
+fn boxed(place: &Place, state: &OracleState, slack: f64) -> [[f64; 2]; 2] {
+    let k = f64::from(state.cut_off_deviations);
+    let [xx, xy, yy] = place.covariance;
+    let radius = |variance: f64| (k * variance.sqrt() * (1.0 + slack * ERROR)).ceil();
+    let side = |mean: f64, radius: f64| slack * ERROR * (mean.abs() + radius + TILE);
+    if state.cut_off == OracleCutOff::TileSquare {
+        // The longer axis of the ellipse; pixel centres are whole numbers.
+        let half_difference = 0.5 * (xx - yy);
+        let spread = (half_difference * half_difference + xy * xy).max(LEAST_SPREAD);
+        let radius = radius(0.5 * (xx + yy) + spread.sqrt());
+        return [0, 1].map(|axis| {
+            let mean = place.mean[axis] - 0.5;
+            let slack = side(mean, radius);
+            [
+                ((mean - radius - slack) / TILE).floor(),
+                ((mean + radius + slack + (TILE - 1.0)) / TILE).floor(),
+            ]
+        });
+    }
+    [0, 1].map(|axis| {
+        let (mean, radius) = (place.mean[axis], radius([xx, yy][axis]));
+        let slack = side(mean, radius);
+        [
+            ((mean - radius - slack) / TILE).floor(),
+            ((mean + radius + slack) / TILE).ceil(),
+        ]
+    })
+}
