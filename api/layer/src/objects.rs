@@ -181,7 +181,9 @@ impl Objects {
                 let from = address + usize::try_from(place - first).ok()?;
                 // SAFETY: the application has mapped these bytes, and unmaps them or frees the memory only by commands that wait
                 // for the lock that the caller holds. It may write them meanwhile: they are numbers, any of which is a value.
-                unsafe { std::ptr::copy_nonoverlapping(from as *const u8, bytes.as_mut_ptr(), length) };
+                unsafe {
+                    std::ptr::copy_nonoverlapping(from as *const u8, bytes.as_mut_ptr(), length)
+                };
                 Some(bytes)
             }
             None => read_mappable(memory_handle, place, &mut bytes).then_some(bytes),
@@ -222,7 +224,9 @@ impl Buffer {
             .map(|(&start, _)| start)
             .collect();
         for start in overlapping {
-            let Some(piece) = self.shadow.remove(&start) else { continue };
+            let Some(piece) = self.shadow.remove(&start) else {
+                continue;
+            };
             let piece_end = start + piece.len() as u64;
             if start < offset {
                 let kept = piece[..(offset - start) as usize].to_vec();

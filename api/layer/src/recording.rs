@@ -121,7 +121,11 @@ impl Recording {
     }
 
     /// Begins a subpass, in which nothing is drawn yet.
-    pub(crate) fn begin_pass(&mut self, subpass: Subpass, object: Option<(Arc<RenderPass>, usize)>) {
+    pub(crate) fn begin_pass(
+        &mut self,
+        subpass: Subpass,
+        object: Option<(Arc<RenderPass>, usize)>,
+    ) {
         self.pass = Some(Pass {
             subpass,
             object,
@@ -131,7 +135,9 @@ impl Recording {
 
     /// Goes on with the next subpass.
     pub(crate) fn next_subpass(&mut self) {
-        let Some((object, index)) = self.pass.take().and_then(|pass| pass.object) else { return };
+        let Some((object, index)) = self.pass.take().and_then(|pass| pass.object) else {
+            return;
+        };
         let subpass = object.get(index + 1).cloned().unwrap_or_default();
         self.begin_pass(subpass, Some((object, index + 1)));
     }

@@ -75,17 +75,23 @@ impl Request {
             let stages = slice(info.p_stages, info.stage_count);
             let is_dynamic = |state: &vk::DynamicState| dynamic.contains(state);
             let static_viewport = viewport
-                .filter(|state| !is_dynamic(&vk::DynamicState::VIEWPORT) && state.viewport_count > 0)
+                .filter(|state| {
+                    !is_dynamic(&vk::DynamicState::VIEWPORT) && state.viewport_count > 0
+                })
                 .and_then(|state| state.p_viewports.as_ref())
                 .map(|v| [v.x, v.y, v.width, v.height]);
             Some(Self {
-                draws_gaussians: assembly
-                    .is_some_and(|state| state.topology == PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST),
+                draws_gaussians: assembly.is_some_and(|state| {
+                    state.topology == PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST
+                }),
                 restart: assembly.is_some_and(|state| state.primitive_restart_enable != 0),
                 gaussian: gaussian.map(GaussianState::of),
                 approximation: approximation
                     .map(|numbers| [numbers.exponential_error, numbers.contribution_budget]),
-                stages: stages.iter().map(|stage| read_stage(stage, objects)).collect(),
+                stages: stages
+                    .iter()
+                    .map(|stage| read_stage(stage, objects))
+                    .collect(),
                 vertex_input: (!is_dynamic(&vk::DynamicState::VERTEX_INPUT_EXT))
                     .then(|| read_vertex_input(info.p_vertex_input_state.as_ref())),
                 subpass: read_subpass(info, objects),
@@ -101,10 +107,12 @@ impl Request {
                         || state.depth_bounds_test_enable != 0
                         || state.stencil_test_enable != 0
                 }),
-                writes_depth: depth
-                    .is_some_and(|state| state.depth_test_enable != 0 && state.depth_write_enable != 0),
-                samples: multisample
-                    .map_or(vk::SampleCountFlags::TYPE_1, |state| state.rasterization_samples),
+                writes_depth: depth.is_some_and(|state| {
+                    state.depth_test_enable != 0 && state.depth_write_enable != 0
+                }),
+                samples: multisample.map_or(vk::SampleCountFlags::TYPE_1, |state| {
+                    state.rasterization_samples
+                }),
                 viewport_count: if is_dynamic(&vk::DynamicState::VIEWPORT_WITH_COUNT) {
                     1
                 } else {
@@ -119,7 +127,9 @@ impl Request {
 
     /// Reports whether a stage is there.
     pub(crate) fn has(&self, stages: vk::ShaderStageFlags) -> bool {
-        self.stages.iter().any(|stage| stages.intersects(stage.stage))
+        self.stages
+            .iter()
+            .any(|stage| stages.intersects(stage.stage))
     }
 
     /// Reports whether a state is dynamic.
@@ -154,16 +164,28 @@ unsafe fn read_stage(stage: &vk::PipelineShaderStageCreateInfo<'_>, objects: &Ob
 unsafe fn read_vertex_input(
     state: Option<&vk::PipelineVertexInputStateCreateInfo<'_>>,
 ) -> (BTreeMap<u32, VertexBinding>, BTreeMap<u32, Attribute>) {
-    let Some(state) = state else { return Default::default() };
+    let Some(state) = state else {
+        return Default::default();
+    };
     // SAFETY: the caller's promise.
     unsafe {
         let divisors = find::<vk::PipelineVertexInputDivisorStateCreateInfoKHR<'_>>(state.p_next);
         let divisors = divisors
-            .map(|info| slice(info.p_vertex_binding_divisors, info.vertex_binding_divisor_count))
+            .map(|info| {
+                slice(
+                    info.p_vertex_binding_divisors,
+                    info.vertex_binding_divisor_count,
+                )
+            })
             .unwrap_or_default();
-        let bindings = slice(state.p_vertex_binding_descriptions, state.vertex_binding_description_count);
-        let attributes =
-            slice(state.p_vertex_attribute_descriptions, state.vertex_attribute_description_count);
+        let bindings = slice(
+            state.p_vertex_binding_descriptions,
+            state.vertex_binding_description_count,
+        );
+        let attributes = slice(
+            state.p_vertex_attribute_descriptions,
+            state.vertex_attribute_description_count,
+        );
         let binding = |b: &vk::VertexInputBindingDescription| {
             let divisor = divisors.iter().find(|divisor| divisor.binding == b.binding);
             let binding = VertexBinding {
@@ -201,7 +223,10 @@ unsafe fn read_subpass(info: &vk::GraphicsPipelineCreateInfo<'_>, objects: &Obje
         let Some(rendering) = find::<vk::PipelineRenderingCreateInfo<'_>>(info.p_next) else {
             return Subpass::default();
         };
-        let formats = slice(rendering.p_color_attachment_formats, rendering.color_attachment_count);
+        let formats = slice(
+            rendering.p_color_attachment_formats,
+            rendering.color_attachment_count,
+        );
         let depth = if rendering.depth_attachment_format == vk::Format::UNDEFINED {
             rendering.stencil_attachment_format
         } else {

@@ -31,7 +31,8 @@ pub(super) unsafe extern "system" fn create_instance(
         let Some(create) = get(vk::Instance::null(), c"vkCreateInstance".as_ptr()) else {
             return vk::Result::ERROR_INITIALIZATION_FAILED;
         };
-        let create = std::mem::transmute::<unsafe extern "system" fn(), vk::PFN_vkCreateInstance>(create);
+        let create =
+            std::mem::transmute::<unsafe extern "system" fn(), vk::PFN_vkCreateInstance>(create);
         let result = create(info, allocator, instance);
         if result == vk::Result::SUCCESS {
             let register = AssertUnwindSafe(|| Instance::register(*instance, &link));
@@ -50,7 +51,9 @@ pub(super) unsafe extern "system" fn destroy_instance(
     }
     // SAFETY: see the module.
     unsafe {
-        let Some(forgotten) = Instance::forget(instance) else { return };
+        let Some(forgotten) = Instance::forget(instance) else {
+            return;
+        };
         if let Some(destroy) = forgotten.next::<vk::PFN_vkDestroyInstance>(c"vkDestroyInstance") {
             destroy(instance, allocator);
         }
@@ -87,7 +90,9 @@ pub(super) unsafe extern "system" fn destroy_messenger(
 ) {
     // SAFETY: see the module.
     unsafe {
-        let Some(own) = Instance::of(instance) else { return };
+        let Some(own) = Instance::of(instance) else {
+            return;
+        };
         own.messengers.remove(messenger);
         type Destroy = vk::PFN_vkDestroyDebugUtilsMessengerEXT;
         if let Some(destroy) = own.next::<Destroy>(c"vkDestroyDebugUtilsMessengerEXT") {
@@ -105,18 +110,27 @@ pub(super) unsafe extern "system" fn create_device(
     // SAFETY: see the module; the loader's link is in the chain.
     unsafe {
         let failed = vk::Result::ERROR_INITIALIZATION_FAILED;
-        let Some(instance) = Instance::of(physical_device) else { return failed };
-        let Some(link) = take_link::<DeviceLink>((*info).p_next) else { return failed };
+        let Some(instance) = Instance::of(physical_device) else {
+            return failed;
+        };
+        let Some(link) = take_link::<DeviceLink>((*info).p_next) else {
+            return failed;
+        };
         let get = link.get_instance_proc_addr;
-        let Some(create) = get(instance.handle, c"vkCreateDevice".as_ptr()) else { return failed };
-        let create = std::mem::transmute::<unsafe extern "system" fn(), vk::PFN_vkCreateDevice>(create);
+        let Some(create) = get(instance.handle, c"vkCreateDevice".as_ptr()) else {
+            return failed;
+        };
+        let create =
+            std::mem::transmute::<unsafe extern "system" fn(), vk::PFN_vkCreateDevice>(create);
         let result = create(physical_device, info, allocator, device);
         let (info, created) = (&*info, (result == vk::Result::SUCCESS).then(|| *device));
         let looked = catch_unwind(AssertUnwindSafe(|| {
             look(physical_device, info, created, &instance, &link);
         }));
         if looked.is_err() {
-            eprintln!("VK_LAYER_GAURAST_validation: a defect of the layer; a device goes unchecked");
+            eprintln!(
+                "VK_LAYER_GAURAST_validation: a defect of the layer; a device goes unchecked"
+            );
         }
         result
     }
@@ -134,13 +148,15 @@ unsafe fn look(
     let mut faults = Faults::default();
     // SAFETY: the caller's promise.
     let (names, features, can) = unsafe {
-        let names = slice(info.pp_enabled_extension_names, info.enabled_extension_count);
+        let names = slice(
+            info.pp_enabled_extension_names,
+            info.enabled_extension_count,
+        );
         let names: Vec<&CStr> = names.iter().map(|&name| string(name)).collect();
         let mut structures = chain(info.p_next);
         let found = structures.find(|s| s.s_type == FeaturesStructure::STRUCTURE_TYPE);
-        let features = found.map(|found| {
-            Features::of(&*std::ptr::from_ref(found).cast::<FeaturesStructure<'_>>())
-        });
+        let features = found
+            .map(|found| Features::of(&*std::ptr::from_ref(found).cast::<FeaturesStructure<'_>>()));
         (names, features, supported(physical_device, instance))
     };
     rules::device::check(&names, features.as_ref(), can.as_ref(), &mut faults);
@@ -204,7 +220,10 @@ unsafe fn facts(
     }
     let types = memory.memory_types_as_slice().iter().enumerate();
     let mappable = types
-        .filter(|(_, ty)| ty.property_flags.contains(vk::MemoryPropertyFlags::HOST_VISIBLE))
+        .filter(|(_, ty)| {
+            ty.property_flags
+                .contains(vk::MemoryPropertyFlags::HOST_VISIBLE)
+        })
         .fold(0, |bits, (index, _)| bits | 1 << index);
     Facts {
         has_extension: is_enabled,

@@ -172,7 +172,10 @@ fn subpass_of(
     Subpass {
         view_mask,
         colors: colors.collect(),
-        depth: depth.and_then(at).map(|(format, _)| format).unwrap_or_default(),
+        depth: depth
+            .and_then(at)
+            .map(|(format, _)| format)
+            .unwrap_or_default(),
     }
 }
 
@@ -185,7 +188,9 @@ pub(super) unsafe extern "system" fn destroy_device(
     }
     // SAFETY: see the module above.
     unsafe {
-        let Some(own) = Device::forget(device) else { return };
+        let Some(own) = Device::forget(device) else {
+            return;
+        };
         if let Some(next) = own.next.destroy_device {
             next(device, allocator);
         }
@@ -202,8 +207,12 @@ pub(super) unsafe extern "system" fn map_memory(
 ) -> vk::Result {
     // SAFETY: see the module above.
     unsafe {
-        let Some(own) = Device::of(device) else { return FAILED };
-        let Some(next) = own.next.map_memory else { return FAILED };
+        let Some(own) = Device::of(device) else {
+            return FAILED;
+        };
+        let Some(next) = own.next.map_memory else {
+            return FAILED;
+        };
         // Locked, since the layer may map the memory for a while.
         let mut state = own.lock();
         let result = next(device, memory, offset, size, flags, data);
@@ -223,8 +232,12 @@ pub(super) unsafe extern "system" fn map_memory2(
 ) -> vk::Result {
     // SAFETY: see the module above.
     unsafe {
-        let Some(own) = Device::of(device) else { return FAILED };
-        let Some(next) = own.next.map_memory2 else { return FAILED };
+        let Some(own) = Device::of(device) else {
+            return FAILED;
+        };
+        let Some(next) = own.next.map_memory2 else {
+            return FAILED;
+        };
         let mut state = own.lock();
         let result = next(device, info, data);
         if result == vk::Result::SUCCESS
@@ -239,7 +252,9 @@ pub(super) unsafe extern "system" fn map_memory2(
 pub(super) unsafe extern "system" fn unmap_memory(device: vk::Device, memory: vk::DeviceMemory) {
     // SAFETY: see the module above.
     unsafe {
-        let Some(own) = Device::of(device) else { return };
+        let Some(own) = Device::of(device) else {
+            return;
+        };
         let mut state = own.lock();
         if let Some(known) = state.objects.memories.get_mut(&memory) {
             known.mapped = None;
@@ -256,8 +271,12 @@ pub(super) unsafe extern "system" fn unmap_memory2(
 ) -> vk::Result {
     // SAFETY: see the module above.
     unsafe {
-        let Some(own) = Device::of(device) else { return FAILED };
-        let Some(next) = own.next.unmap_memory2 else { return FAILED };
+        let Some(own) = Device::of(device) else {
+            return FAILED;
+        };
+        let Some(next) = own.next.unmap_memory2 else {
+            return FAILED;
+        };
         let mut state = own.lock();
         if let Some(known) = state.objects.memories.get_mut(&(*info).memory) {
             known.mapped = None;
@@ -274,8 +293,12 @@ pub(super) unsafe extern "system" fn bind_buffer_memory(
 ) -> vk::Result {
     // SAFETY: see the module above.
     unsafe {
-        let Some(own) = Device::of(device) else { return FAILED };
-        let Some(next) = own.next.bind_buffer_memory else { return FAILED };
+        let Some(own) = Device::of(device) else {
+            return FAILED;
+        };
+        let Some(next) = own.next.bind_buffer_memory else {
+            return FAILED;
+        };
         own.observe(|state, _| {
             if let Some(known) = state.objects.buffers.get_mut(&buffer) {
                 known.memory = Some((memory, offset));
@@ -292,8 +315,12 @@ pub(super) unsafe extern "system" fn bind_buffer_memory2(
 ) -> vk::Result {
     // SAFETY: see the module above.
     unsafe {
-        let Some(own) = Device::of(device) else { return FAILED };
-        let Some(next) = own.next.bind_buffer_memory2 else { return FAILED };
+        let Some(own) = Device::of(device) else {
+            return FAILED;
+        };
+        let Some(next) = own.next.bind_buffer_memory2 else {
+            return FAILED;
+        };
         own.observe(|state, _| {
             for info in slice(infos, count) {
                 if let Some(known) = state.objects.buffers.get_mut(&info.buffer) {
@@ -311,8 +338,12 @@ pub(super) unsafe extern "system" fn get_buffer_device_address(
 ) -> vk::DeviceAddress {
     // SAFETY: see the module above.
     unsafe {
-        let Some(own) = Device::of(device) else { return 0 };
-        let Some(next) = own.next.get_buffer_device_address else { return 0 };
+        let Some(own) = Device::of(device) else {
+            return 0;
+        };
+        let Some(next) = own.next.get_buffer_device_address else {
+            return 0;
+        };
         let address = next(device, info);
         own.observe(|state, _| {
             if let Some(known) = state.objects.buffers.get_mut(&(*info).buffer) {
@@ -335,8 +366,12 @@ pub(super) unsafe extern "system" fn create_graphics_pipelines(
 ) -> vk::Result {
     // SAFETY: see the module above.
     unsafe {
-        let Some(own) = Device::of(device) else { return FAILED };
-        let Some(next) = own.next.create_graphics_pipelines else { return FAILED };
+        let Some(own) = Device::of(device) else {
+            return FAILED;
+        };
+        let Some(next) = own.next.create_graphics_pipelines else {
+            return FAILED;
+        };
         let mut requests = Vec::new();
         own.observe(|state, faults| {
             for info in slice(infos, count) {
@@ -364,8 +399,14 @@ pub(super) unsafe extern "system" fn create_graphics_pipelines(
 }
 
 fn pipeline_of(request: Request, serial: u64) -> Pipeline {
-    let is_blended = request.blend.first().is_some_and(|blend| blend.blend_enable != 0);
-    let writes = request.blend.first().is_some_and(|blend| !blend.color_write_mask.is_empty());
+    let is_blended = request
+        .blend
+        .first()
+        .is_some_and(|blend| blend.blend_enable != 0);
+    let writes = request
+        .blend
+        .first()
+        .is_some_and(|blend| !blend.color_write_mask.is_empty());
     let has_fragment = request.has(vk::ShaderStageFlags::FRAGMENT);
     let (bindings, attributes) = request.vertex_input.unwrap_or_default();
     Pipeline {
@@ -388,8 +429,12 @@ pub(super) unsafe extern "system" fn allocate_descriptor_sets(
 ) -> vk::Result {
     // SAFETY: see the module above.
     unsafe {
-        let Some(own) = Device::of(device) else { return FAILED };
-        let Some(next) = own.next.allocate_descriptor_sets else { return FAILED };
+        let Some(own) = Device::of(device) else {
+            return FAILED;
+        };
+        let Some(next) = own.next.allocate_descriptor_sets else {
+            return FAILED;
+        };
         let result = next(device, info, sets);
         if result == vk::Result::SUCCESS {
             own.observe(|state, _| {
@@ -418,8 +463,12 @@ pub(super) unsafe extern "system" fn free_descriptor_sets(
 ) -> vk::Result {
     // SAFETY: see the module above.
     unsafe {
-        let Some(own) = Device::of(device) else { return FAILED };
-        let Some(next) = own.next.free_descriptor_sets else { return FAILED };
+        let Some(own) = Device::of(device) else {
+            return FAILED;
+        };
+        let Some(next) = own.next.free_descriptor_sets else {
+            return FAILED;
+        };
         own.observe(|state, _| {
             for set in slice(sets, count) {
                 state.objects.sets.remove(set);
@@ -436,8 +485,12 @@ pub(super) unsafe extern "system" fn reset_descriptor_pool(
 ) -> vk::Result {
     // SAFETY: see the module above.
     unsafe {
-        let Some(own) = Device::of(device) else { return FAILED };
-        let Some(next) = own.next.reset_descriptor_pool else { return FAILED };
+        let Some(own) = Device::of(device) else {
+            return FAILED;
+        };
+        let Some(next) = own.next.reset_descriptor_pool else {
+            return FAILED;
+        };
         own.observe(|state, _| state.objects.sets.retain(|_, set| set.pool != pool));
         next(device, pool, flags)
     }
@@ -490,7 +543,9 @@ pub(super) unsafe extern "system" fn update_descriptor_sets(
 ) {
     // SAFETY: see the module above.
     unsafe {
-        let Some(own) = Device::of(device) else { return };
+        let Some(own) = Device::of(device) else {
+            return;
+        };
         own.observe(|state, _| {
             for write in slice(writes, write_count) {
                 let buffers = written_buffers(write);
@@ -499,10 +554,13 @@ pub(super) unsafe extern "system" fn update_descriptor_sets(
                         known.is_written = true;
                     }
                 }
-                let Some(set) = state.objects.sets.get_mut(&write.dst_set) else { continue };
+                let Some(set) = state.objects.sets.get_mut(&write.dst_set) else {
+                    continue;
+                };
                 let first = buffers.first().filter(|_| write.dst_array_element == 0);
                 if let Some(&(binding, info)) = first {
-                    set.buffers.insert(binding, (info.buffer, info.offset, info.range));
+                    set.buffers
+                        .insert(binding, (info.buffer, info.offset, info.range));
                 }
             }
             for copy in slice(copies, copy_count) {
@@ -525,7 +583,9 @@ pub(super) unsafe extern "system" fn update_descriptor_set_with_template(
 ) {
     // SAFETY: see the module above.
     unsafe {
-        let Some(own) = Device::of(device) else { return };
+        let Some(own) = Device::of(device) else {
+            return;
+        };
         own.observe(|state, _| {
             if let Some(set) = state.objects.sets.get_mut(&set) {
                 set.is_unknown = true;

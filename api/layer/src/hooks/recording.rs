@@ -23,8 +23,12 @@ pub(super) unsafe extern "system" fn allocate_command_buffers(
 ) -> vk::Result {
     // SAFETY: see the module above.
     unsafe {
-        let Some(own) = Device::of(device) else { return FAILED };
-        let Some(next) = own.next.allocate_command_buffers else { return FAILED };
+        let Some(own) = Device::of(device) else {
+            return FAILED;
+        };
+        let Some(next) = own.next.allocate_command_buffers else {
+            return FAILED;
+        };
         let result = next(device, info, buffers);
         if result == vk::Result::SUCCESS {
             own.observe(|state, _| {
@@ -46,7 +50,9 @@ pub(super) unsafe extern "system" fn free_command_buffers(
 ) {
     // SAFETY: see the module above.
     unsafe {
-        let Some(own) = Device::of(device) else { return };
+        let Some(own) = Device::of(device) else {
+            return;
+        };
         own.observe(|state, _| {
             for commands in slice(buffers, count) {
                 state.recordings.remove(commands);
@@ -64,8 +70,12 @@ pub(super) unsafe extern "system" fn begin_command_buffer(
 ) -> vk::Result {
     // SAFETY: see the module above.
     unsafe {
-        let Some(own) = Device::of(commands) else { return FAILED };
-        let Some(next) = own.next.begin_command_buffer else { return FAILED };
+        let Some(own) = Device::of(commands) else {
+            return FAILED;
+        };
+        let Some(next) = own.next.begin_command_buffer else {
+            return FAILED;
+        };
         own.observe(|state, _| {
             let (recording, objects) = state.recording(commands);
             *recording = Recording::new(recording.pool);
@@ -75,10 +85,15 @@ pub(super) unsafe extern "system" fn begin_command_buffer(
                 return;
             };
             let subpass = match objects.render_passes.get(&inherited.render_pass) {
-                Some(pass) => pass.get(inherited.subpass as usize).cloned().unwrap_or_default(),
+                Some(pass) => pass
+                    .get(inherited.subpass as usize)
+                    .cloned()
+                    .unwrap_or_default(),
                 None => Subpass {
-                    view_mask: find::<vk::CommandBufferInheritanceRenderingInfo<'_>>(inherited.p_next)
-                        .map_or(0, |rendering| rendering.view_mask),
+                    view_mask: find::<vk::CommandBufferInheritanceRenderingInfo<'_>>(
+                        inherited.p_next,
+                    )
+                    .map_or(0, |rendering| rendering.view_mask),
                     ..Subpass::default()
                 },
             };
@@ -91,8 +106,12 @@ pub(super) unsafe extern "system" fn begin_command_buffer(
 pub(super) unsafe extern "system" fn end_command_buffer(commands: vk::CommandBuffer) -> vk::Result {
     // SAFETY: see the module above.
     unsafe {
-        let Some(own) = Device::of(commands) else { return FAILED };
-        let Some(next) = own.next.end_command_buffer else { return FAILED };
+        let Some(own) = Device::of(commands) else {
+            return FAILED;
+        };
+        let Some(next) = own.next.end_command_buffer else {
+            return FAILED;
+        };
         own.observe(|state, faults| {
             let (recording, _) = state.recording(commands);
             rules::set::require_ended(recording, "vkEndCommandBuffer", faults);
@@ -465,11 +484,15 @@ pub(super) unsafe extern "system" fn cmd_execute_commands(
 ) {
     // SAFETY: see the module above.
     unsafe {
-        let Some(own) = Device::of(commands) else { return };
+        let Some(own) = Device::of(commands) else {
+            return;
+        };
         own.observe(|state, faults| {
             let executed = slice(buffers, count).iter();
             let executed = executed.filter_map(|commands| state.recordings.get(commands));
-            let operations: Vec<_> = executed.flat_map(|other| other.operations.clone()).collect();
+            let operations: Vec<_> = executed
+                .flat_map(|other| other.operations.clone())
+                .collect();
             let (recording, _) = state.recording(commands);
             rules::set::require_ended(recording, "vkCmdExecuteCommands", faults);
             recording.operations.extend(operations);
@@ -482,17 +505,27 @@ pub(super) unsafe extern "system" fn cmd_execute_commands(
 }
 
 fn is_dynamic(ty: vk::DescriptorType) -> bool {
-    ty == vk::DescriptorType::UNIFORM_BUFFER_DYNAMIC || ty == vk::DescriptorType::STORAGE_BUFFER_DYNAMIC
+    ty == vk::DescriptorType::UNIFORM_BUFFER_DYNAMIC
+        || ty == vk::DescriptorType::STORAGE_BUFFER_DYNAMIC
 }
 
-fn set_viewport(recording: &mut Recording, viewport: Option<&vk::Viewport>, state: vk::DynamicState) {
+fn set_viewport(
+    recording: &mut Recording,
+    viewport: Option<&vk::Viewport>,
+    state: vk::DynamicState,
+) {
     let Some(v) = viewport else { return };
     recording.viewport = Some([v.x, v.y, v.width, v.height]);
     recording.set_dynamic(state, format!("{v:?}"));
 }
 
 /// A value of the front faces' stencil state, which Gaussians have.
-fn set_front(recording: &mut Recording, faces: vk::StencilFaceFlags, state: vk::DynamicState, value: u32) {
+fn set_front(
+    recording: &mut Recording,
+    faces: vk::StencilFaceFlags,
+    state: vk::DynamicState,
+    value: u32,
+) {
     if faces.contains(vk::StencilFaceFlags::FRONT) {
         recording.set_dynamic(state, value.to_ne_bytes());
     }

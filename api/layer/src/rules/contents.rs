@@ -37,9 +37,15 @@ pub(crate) trait Reader {
 
 /// Checks a draw's contents.
 pub(crate) fn check(draw: &Draw, reader: &dyn Reader, facts: &Facts, faults: &mut Faults) {
-    let Ok(cameras) = cameras(draw, reader, facts, faults) else { return };
-    let Some(call) = direct(draw.call, reader, facts, faults) else { return };
-    let Some(gaussians) = Gaussians::of(draw, call, reader, faults) else { return };
+    let Ok(cameras) = cameras(draw, reader, facts, faults) else {
+        return;
+    };
+    let Some(call) = direct(draw.call, reader, facts, faults) else {
+        return;
+    };
+    let Some(gaussians) = Gaussians::of(draw, call, reader, faults) else {
+        return;
+    };
     count(draw, &gaussians, cameras.first(), faults);
 }
 
@@ -54,7 +60,9 @@ fn cameras(
         let cameras = draw.cameras.as_deref();
         return Ok(cameras.cloned().unwrap_or_default());
     }
-    let Some(found) = reader.descriptor(draw) else { return Ok(Vec::new()) };
+    let Some(found) = reader.descriptor(draw) else {
+        return Ok(Vec::new());
+    };
     let id = "VUID-VkPipelineGaussianStateCreateInfoGAURAST-cameraBinding-90025";
     let (buffer, offset, range) = match found {
         Ok(found) => found,
@@ -65,7 +73,10 @@ fn cameras(
     };
     let count = u64::from(draw.state.camera_count);
     let element = size_of::<GaussianCameraDataGAURAST>() as u64;
-    let size = reader.size(buffer).unwrap_or(u64::MAX).saturating_sub(offset);
+    let size = reader
+        .size(buffer)
+        .unwrap_or(u64::MAX)
+        .saturating_sub(offset);
     let range = if range == vk::WHOLE_SIZE { size } else { range };
     if range < count * element {
         faults.error(
@@ -74,13 +85,20 @@ fn cameras(
         );
         return Err(());
     }
-    let Some(bytes) = reader.read(buffer, offset, count * element) else { return Ok(Vec::new()) };
+    let Some(bytes) = reader.read(buffer, offset, count * element) else {
+        return Ok(Vec::new());
+    };
     let before = faults.0.len();
     let elements = bytes.chunks_exact(element as usize).enumerate();
     let cameras: Vec<_> = elements
         .map(|(index, bytes)| {
             let camera = camera_of(bytes);
-            camera::check(&camera, &format!("cameras[{index}] of the uniform buffer"), facts, faults);
+            camera::check(
+                &camera,
+                &format!("cameras[{index}] of the uniform buffer"),
+                facts,
+                faults,
+            );
             draw::check_model(&camera, &draw.state, faults);
             camera
         })
@@ -96,11 +114,14 @@ fn camera_of(bytes: &[u8]) -> Camera {
         u32::from_le_bytes(bytes.unwrap_or_default())
     };
     let float = |index: usize| f32::from_bits(word(index));
-    let double = |index: usize| f64::from_bits(u64::from(word(index)) | u64::from(word(index + 1)) << 32);
+    let double =
+        |index: usize| f64::from_bits(u64::from(word(index)) | u64::from(word(index + 1)) << 32);
     let pair = |index: usize| [float(index), float(index + 1)];
     let camera = GaussianCameraGAURAST::default()
         .model(Model::from_raw(word(6).cast_signed()))
-        .rotation(std::array::from_fn(|index| float(8 + index / 3 * 4 + index % 3)))
+        .rotation(std::array::from_fn(|index| {
+            float(8 + index / 3 * 4 + index % 3)
+        }))
         .eye([double(0), double(2), double(4)])
         .focal_length(pair(20))
         .principal_point(pair(22))
@@ -112,17 +133,24 @@ fn camera_of(bytes: &[u8]) -> Camera {
 
 /// The call with the parameters of an indirect one.
 fn direct(call: Call, reader: &dyn Reader, facts: &Facts, faults: &mut Faults) -> Option<Call> {
-    let Call::Indirect(buffer, offset, is_indexed) = call else { return Some(call) };
+    let Call::Indirect(buffer, offset, is_indexed) = call else {
+        return Some(call);
+    };
     let bytes = reader.read(buffer, offset, if is_indexed { 20 } else { 16 })?;
     let word = |index: usize| -> Option<u32> {
-        Some(u32::from_le_bytes(bytes.get(4 * index..)?.get(..4)?.try_into().ok()?))
+        Some(u32::from_le_bytes(
+            bytes.get(4 * index..)?.get(..4)?.try_into().ok()?,
+        ))
     };
     let (count, instances, first) = (word(0)?, word(1)?, word(2)?);
     let gaussians = u64::from(count) * u64::from(instances);
     if facts.has_extension && gaussians > facts.max_gaussians_per_draw {
         faults.error(
             "GAURAST-Draw-maxGaussiansPerDraw",
-            format!("the indirect draw has {gaussians} Gaussians, but must not have more than {}", facts.max_gaussians_per_draw),
+            format!(
+                "the indirect draw has {gaussians} Gaussians, but must not have more than {}",
+                facts.max_gaussians_per_draw
+            ),
         );
         return None;
     }
@@ -155,11 +183,15 @@ impl<'a> Gaussians<'a> {
         let (numbers, vertices) = match call {
             Call::Vertices(numbers) => {
                 let [first, count, ..] = numbers.map(u64::from);
-                (numbers, (first..first + count.min(MOST)).collect::<Vec<_>>())
+                (
+                    numbers,
+                    (first..first + count.min(MOST)).collect::<Vec<_>>(),
+                )
             }
-            Call::Indices(numbers, vertex_offset) => {
-                (numbers, indexed(draw, numbers, vertex_offset, reader, faults)?)
-            }
+            Call::Indices(numbers, vertex_offset) => (
+                numbers,
+                indexed(draw, numbers, vertex_offset, reader, faults)?,
+            ),
             Call::Indirect(..) => return None,
         };
         let [_, count, first_instance, instances] = numbers.map(u64::from);
@@ -207,19 +239,29 @@ impl<'a> Gaussians<'a> {
         } else {
             vertex
         };
-        let offset = index.checked_sub(elements.first)? * elements.stride + u64::from(attribute.offset);
+        let offset =
+            index.checked_sub(elements.first)? * elements.stride + u64::from(attribute.offset);
         Format::of(attribute.format).read(&elements.bytes, usize::try_from(offset).ok()?)
     }
 }
 
-fn read_elements(draw: &Draw, number: u32, (first, last): (u64, u64), reader: &dyn Reader) -> Option<Elements> {
+fn read_elements(
+    draw: &Draw,
+    number: u32,
+    (first, last): (u64, u64),
+    reader: &dyn Reader,
+) -> Option<Elements> {
     let bound = draw.vertex_buffers.get(&number)?;
     let binding = draw.pipeline.bindings.get(&number)?;
     let stride = u64::from(bound.stride.unwrap_or(binding.stride));
     let size = reader.size(bound.buffer)?.saturating_sub(bound.offset);
     let size = bound.size.map_or(size, |given| given.min(size));
     let start = (first * stride).min(size);
-    let attributes = draw.pipeline.attributes.values().filter(|attribute| attribute.binding == number);
+    let attributes = draw
+        .pipeline
+        .attributes
+        .values()
+        .filter(|attribute| attribute.binding == number);
     let ends = attributes.map(|a| u64::from(a.offset) + u64::from(Format::of(a.format).bytes));
     let end = (last * stride + ends.max().unwrap_or(stride)).min(size);
     if end - start > MOST_BYTES {
@@ -244,15 +286,24 @@ fn indexed(
     let bytes = draw::index_bytes(index.ty);
     let offset = index.offset + u64::from(first) * bytes;
     let has = reader.size(index.buffer)?.saturating_sub(offset) / bytes;
-    let read = reader.read(index.buffer, offset, bytes * u64::from(count).min(MOST).min(has))?;
+    let read = reader.read(
+        index.buffer,
+        offset,
+        bytes * u64::from(count).min(MOST).min(has),
+    )?;
     let vertices: Vec<i64> = (read.chunks_exact(bytes as usize))
         .map(|chunk| {
-            let value = chunk.iter().rev().fold(0, |value, &byte| value << 8 | i64::from(byte));
+            let value = chunk
+                .iter()
+                .rev()
+                .fold(0, |value, &byte| value << 8 | i64::from(byte));
             value + i64::from(vertex_offset)
         })
         .collect();
     let holds = vertices_of(draw, reader)?;
-    let beyond = vertices.iter().filter(|&&vertex| vertex < 0 || vertex as u64 >= holds);
+    let beyond = vertices
+        .iter()
+        .filter(|&&vertex| vertex < 0 || vertex as u64 >= holds);
     let (beyond, greatest) = (beyond.count(), vertices.iter().max().copied().unwrap_or(0));
     if beyond > 0 {
         faults.warning(
@@ -396,7 +447,11 @@ impl Counts {
         let (flags, state) = (draw.state.flags, &draw.state);
         let finite = |values: &[f32]| values.iter().all(|value| value.is_finite());
         let is_log = flags.contains(Flags::LOG_SCALE);
-        let scale = if is_log { g.scale.map(f32::exp) } else { g.scale };
+        let scale = if is_log {
+            g.scale.map(f32::exp)
+        } else {
+            g.scale
+        };
         let mut opacity = g.opacity;
         if flags.contains(Flags::LOGIT_OPACITY) {
             opacity = 1.0 / (1.0 + (-opacity).exp());
@@ -421,7 +476,9 @@ impl Counts {
         if opacity < state.alpha_floor {
             return &mut self.below_floor;
         }
-        let Some(camera) = camera else { return &mut self.drawn };
+        let Some(camera) = camera else {
+            return &mut self.drawn;
+        };
         match place(camera, g, scale, state.low_pass_variance, draw.viewport) {
             Place::Behind => &mut self.behind,
             Place::Beyond => &mut self.beyond,
@@ -452,7 +509,11 @@ fn place(
         let rows = model.map(|row| row.map(f64::from));
         let [x, y, z] = position;
         position = rows.map(|[a, b, c, d]| a * x + b * y + c * z + d);
-        let norm: f64 = rows.iter().flat_map(|row| &row[..3]).map(|value| value * value).sum();
+        let norm: f64 = rows
+            .iter()
+            .flat_map(|row| &row[..3])
+            .map(|value| value * value)
+            .sum();
         size *= norm.sqrt();
     }
     let [x, y, z] = std::array::from_fn(|axis| position[axis] - camera.eye[axis]);
@@ -462,21 +523,35 @@ fn place(
     };
     let [x, y, z] = [row(0), row(1), row(2)];
     let is_flat = camera.model == Model::PINHOLE || camera.model == Model::ORTHOGRAPHIC;
-    let depth = if is_flat { z } else { (x * x + y * y + z * z).sqrt() };
+    let depth = if is_flat {
+        z
+    } else {
+        (x * x + y * y + z * z).sqrt()
+    };
     if depth <= f64::from(camera.near_plane) {
         return Place::Behind;
     }
     if depth >= f64::from(camera.far_plane) {
         return Place::Beyond;
     }
-    let Some([_, _, width, height]) = viewport.filter(|_| is_flat) else { return Place::Inside };
-    let unit = if camera.model == Model::PINHOLE { z } else { 1.0 };
+    let Some([_, _, width, height]) = viewport.filter(|_| is_flat) else {
+        return Place::Inside;
+    };
+    let unit = if camera.model == Model::PINHOLE {
+        z
+    } else {
+        1.0
+    };
     // Six standard deviations, as wide as they may become at a grazing angle.
     let blur = 6.0 * f64::from(low_pass).sqrt();
     let is_near = |axis: usize, t: f64, side: f32| {
         let f = f64::from(camera.focal_length[axis]);
         let at = f * t / unit + f64::from(camera.principal_point[axis]);
-        let slant = if camera.model == Model::PINHOLE { 1.0 + (t / z).abs() } else { 1.0 };
+        let slant = if camera.model == Model::PINHOLE {
+            1.0 + (t / z).abs()
+        } else {
+            1.0
+        };
         let radius = 6.0 * f * size / unit * slant + blur;
         at >= -radius && at <= f64::from(side.abs()) + radius
     };
@@ -491,9 +566,17 @@ fn place(
 fn tell(draw: &Draw, counts: &Counts, total: u64, faults: &mut Faults) {
     let c = counts;
     let all = c.all;
-    let of = if all == total { format!("{all}") } else { format!("the first {all}") };
+    let of = if all == total {
+        format!("{all}")
+    } else {
+        format!("the first {all}")
+    };
     let is_some_share = |count: u64| count > 0 && count * SHARE >= all;
-    let nothing = if c.drawn == 0 { "; nothing is drawn" } else { "" };
+    let nothing = if c.drawn == 0 {
+        "; nothing is drawn"
+    } else {
+        ""
+    };
     let before = faults.0.len();
     if c.not_finite > 0 {
         faults.warning(
@@ -508,7 +591,10 @@ fn tell(draw: &Draw, counts: &Counts, total: u64, faults: &mut Faults) {
     if is_some_share(c.zero_quaternion) {
         faults.warning(
             "GAURAST-Draw-zero-quaternion",
-            format!("{} of {of} Gaussians have a rotation of zeros, and are skipped{nothing}", c.zero_quaternion),
+            format!(
+                "{} of {of} Gaussians have a rotation of zeros, and are skipped{nothing}",
+                c.zero_quaternion
+            ),
         );
     }
     if is_some_share(c.negative_scale) {
@@ -578,11 +664,26 @@ fn tell_nothing(draw: &Draw, counts: &Counts, of: &str, faults: &mut Faults) {
         (
             c.below_floor,
             "GAURAST-Draw-opacity-floor",
-            format!("have an opacity below alphaFloor ({})", draw.state.alpha_floor),
+            format!(
+                "have an opacity below alphaFloor ({})",
+                draw.state.alpha_floor
+            ),
         ),
-        (c.behind, "GAURAST-Draw-behind-camera", "are behind the camera's near plane".to_owned()),
-        (c.beyond, "GAURAST-Draw-beyond-camera", "are beyond the camera's far plane".to_owned()),
-        (c.outside, "GAURAST-Draw-outside-picture", "are outside of the picture".to_owned()),
+        (
+            c.behind,
+            "GAURAST-Draw-behind-camera",
+            "are behind the camera's near plane".to_owned(),
+        ),
+        (
+            c.beyond,
+            "GAURAST-Draw-beyond-camera",
+            "are beyond the camera's far plane".to_owned(),
+        ),
+        (
+            c.outside,
+            "GAURAST-Draw-outside-picture",
+            "are outside of the picture".to_owned(),
+        ),
     ];
     let text: Vec<String> = (reasons.iter())
         .filter(|(count, ..)| *count > 0)
@@ -593,8 +694,13 @@ fn tell_nothing(draw: &Draw, counts: &Counts, of: &str, faults: &mut Faults) {
     {
         let hint = match *id {
             "GAURAST-Draw-opacity-floor" => "",
-            _ => ". Camera axes are +x right, +y down, +z forward; the rows of rotation are these directions in the world",
+            _ => {
+                ". Camera axes are +x right, +y down, +z forward; the rows of rotation are these directions in the world"
+            }
         };
-        faults.warning(id, format!("none of {of} Gaussians is drawn: {}{hint}", text.join(", ")));
+        faults.warning(
+            id,
+            format!("none of {of} Gaussians is drawn: {}{hint}", text.join(", ")),
+        );
     }
 }

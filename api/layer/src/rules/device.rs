@@ -56,7 +56,10 @@ pub(crate) fn check(
         if let Some(first) = on.first() {
             faults.error(
                 "VUID-VkDeviceCreateInfo-pNext-pNext",
-                format!("the feature {first} is enabled, but not its extension {}", NAME.to_string_lossy()),
+                format!(
+                    "the feature {first} is enabled, but not its extension {}",
+                    NAME.to_string_lossy()
+                ),
             );
         }
         return;
@@ -83,7 +86,9 @@ pub(crate) fn check(
         Some(_) => {}
     }
     let Some(can) = can else { return };
-    let absent = named(can).into_iter().find(|(name, can)| !can && on.contains(name));
+    let absent = named(can)
+        .into_iter()
+        .find(|(name, can)| !can && on.contains(name));
     if let Some((name, _)) = absent {
         faults.error(
             "VUID-VkDeviceCreateInfo-pNext-features",

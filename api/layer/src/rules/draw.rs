@@ -26,7 +26,9 @@ pub(crate) fn check(
     facts: &Facts,
     faults: &mut Faults,
 ) {
-    let Some(pipeline) = recording.pipeline.clone() else { return };
+    let Some(pipeline) = recording.pipeline.clone() else {
+        return;
+    };
     let viewport = pipeline.viewport.or(recording.viewport);
     let continues_set = pipeline.gaussian.is_some() && matches!(recording.set, Some(Some(_)));
     if let Some(gaussian) = pipeline.gaussian {
@@ -34,7 +36,9 @@ pub(crate) fn check(
         let gaussian = with_dynamic(gaussian, &pipeline, recording, facts, faults);
         check_cameras(recording, &gaussian, viewport, faults);
         check_harmonics(recording, &gaussian, faults);
-        check_ranges(recording, &pipeline, &gaussian, call, objects, facts, faults);
+        check_ranges(
+            recording, &pipeline, &gaussian, call, objects, facts, faults,
+        );
         if faults.is_empty() {
             if !continues_set {
                 check_blending(recording, &pipeline, viewport, faults);
@@ -70,7 +74,10 @@ fn with_dynamic(
         let Some(bits) = recording.dynamic_bits(own) else {
             faults.error(
                 "VUID-vkCmdDraw-dynamic-90060",
-                format!("the pipeline's {} was not set in the command buffer", own_name(own)),
+                format!(
+                    "the pipeline's {} was not set in the command buffer",
+                    own_name(own)
+                ),
             );
             return s;
         };
@@ -85,7 +92,9 @@ fn with_dynamic(
             gvk::DYNAMIC_STATE_GAUSSIAN_LOW_PASS_VARIANCE_GAURAST => s.low_pass_variance = float,
             gvk::DYNAMIC_STATE_GAUSSIAN_ALPHA_FLOOR_GAURAST => s.alpha_floor = float,
             gvk::DYNAMIC_STATE_GAUSSIAN_ALPHA_CEILING_GAURAST => s.alpha_ceiling = float,
-            gvk::DYNAMIC_STATE_GAUSSIAN_TRANSMITTANCE_FLOOR_GAURAST => s.transmittance_floor = float,
+            gvk::DYNAMIC_STATE_GAUSSIAN_TRANSMITTANCE_FLOOR_GAURAST => {
+                s.transmittance_floor = float
+            }
             gvk::DYNAMIC_STATE_GAUSSIAN_EXPONENTIAL_ERROR_GAURAST => approximation[0] = float,
             gvk::DYNAMIC_STATE_GAUSSIAN_CONTRIBUTION_BUDGET_GAURAST => approximation[1] = float,
             _ => s.spherical_harmonics_degree = bits,
@@ -106,11 +115,20 @@ fn with_dynamic(
         },
     );
     let mut broken = Faults::default();
-    state::check_values(&s, Some(approximation), pipeline.has_fragment, facts, &mut broken);
+    state::check_values(
+        &s,
+        Some(approximation),
+        pipeline.has_fragment,
+        facts,
+        &mut broken,
+    );
     if let Some(fault) = broken.0.first() {
         faults.error(
             "VUID-vkCmdDraw-dynamic-90060",
-            format!("the values of dynamic states do not go together: {} ({})", fault.text, fault.id),
+            format!(
+                "the values of dynamic states do not go together: {} ({})",
+                fault.text, fault.id
+            ),
         );
     }
     s
@@ -145,7 +163,10 @@ fn check_cameras(
             "no camera was set in this command buffer, or vkCmdExecuteCommands came after: the draw draws nothing",
         );
     };
-    let view_mask = recording.pass.as_ref().map_or(0, |pass| pass.subpass.view_mask);
+    let view_mask = recording
+        .pass
+        .as_ref()
+        .map_or(0, |pass| pass.subpass.view_mask);
     let views = u32::BITS - view_mask.leading_zeros();
     let count = cameras.len() as u32;
     faults.require(
@@ -168,9 +189,17 @@ pub(crate) fn check_model(camera: &Camera, gaussian: &GaussianState, faults: &mu
     let model = camera.model;
     let is_flat = gaussian.geometry == Geometry::GAUSSIAN_2D;
     if is_flat && model != Model::PINHOLE && model != Model::ORTHOGRAPHIC {
-        faults.error(id, format!("geometry is GAUSSIAN_2D, but the camera is {model:?}, not PINHOLE or ORTHOGRAPHIC"));
+        faults.error(
+            id,
+            format!(
+                "geometry is GAUSSIAN_2D, but the camera is {model:?}, not PINHOLE or ORTHOGRAPHIC"
+            ),
+        );
     } else if gaussian.precision == Precision::FLOAT16 && model == Model::EQUIRECTANGULAR {
-        faults.error(id, "precision is FLOAT16, but the camera is EQUIRECTANGULAR");
+        faults.error(
+            id,
+            "precision is FLOAT16, but the camera is EQUIRECTANGULAR",
+        );
     }
 }
 
@@ -200,7 +229,8 @@ fn warn_of_units(camera: &Camera, [width, height]: [f32; 2], faults: &mut Faults
 }
 
 fn check_harmonics(recording: &Recording, gaussian: &GaussianState, faults: &mut Faults) {
-    let needs = state::is_fixed(gaussian) && gaussian.flags.contains(Flags::SPHERICAL_HARMONICS_BUFFER);
+    let needs =
+        state::is_fixed(gaussian) && gaussian.flags.contains(Flags::SPHERICAL_HARMONICS_BUFFER);
     faults.require(
         !needs || recording.harmonics.is_some(),
         "VUID-vkCmdDraw-sphericalHarmonicsBuffer-90018",
@@ -226,7 +256,10 @@ fn check_ranges(
     if facts.has_extension && gaussians > facts.max_gaussians_per_draw {
         return faults.error(
             "GAURAST-Draw-maxGaussiansPerDraw",
-            format!("the draw has {gaussians} Gaussians, but must not have more than {}", facts.max_gaussians_per_draw),
+            format!(
+                "the draw has {gaussians} Gaussians, but must not have more than {}",
+                facts.max_gaussians_per_draw
+            ),
         );
     }
     if count == 0 || instances == 0 {
@@ -236,7 +269,14 @@ fn check_ranges(
         check_indices(recording, first, count, objects, faults);
     }
     let by_vertex = matches!(call, Call::Vertices(_)).then_some((first, count));
-    check_vertices(recording, pipeline, by_vertex, (first_instance, instances), objects, faults);
+    check_vertices(
+        recording,
+        pipeline,
+        by_vertex,
+        (first_instance, instances),
+        objects,
+        faults,
+    );
     let locations = &gaussian.attribute_locations;
     let used = [
         locations.position,
@@ -247,11 +287,14 @@ fn check_ranges(
         locations.first_model_matrix,
         locations.model_opacity,
     ];
-    let by_instance = used.into_iter().filter(|&location| location != UNUSED).any(|location| {
-        let attribute = pipeline.attributes.get(&location);
-        let binding = attribute.and_then(|attribute| pipeline.bindings.get(&attribute.binding));
-        binding.is_none_or(|binding| binding.by_instance)
-    });
+    let by_instance = used
+        .into_iter()
+        .filter(|&location| location != UNUSED)
+        .any(|location| {
+            let attribute = pipeline.attributes.get(&location);
+            let binding = attribute.and_then(|attribute| pipeline.bindings.get(&attribute.binding));
+            binding.is_none_or(|binding| binding.by_instance)
+        });
     if state::is_fixed(gaussian) && instances > 1 && !by_instance {
         faults.warning(
             "GAURAST-Draw-instances",
@@ -263,16 +306,30 @@ fn check_ranges(
     }
 }
 
-fn check_indices(recording: &Recording, first: u32, count: u32, objects: &Objects, faults: &mut Faults) {
-    let Some(index) = recording.index_buffer else { return };
+fn check_indices(
+    recording: &Recording,
+    first: u32,
+    count: u32,
+    objects: &Objects,
+    faults: &mut Faults,
+) {
+    let Some(index) = recording.index_buffer else {
+        return;
+    };
     let bytes = index_bytes(index.ty);
-    let Some(buffer) = objects.buffers.get(&index.buffer) else { return };
+    let Some(buffer) = objects.buffers.get(&index.buffer) else {
+        return;
+    };
     let end = (u64::from(first) + u64::from(count)) * bytes;
     let has = buffer.size.saturating_sub(index.offset);
     if end > has {
         faults.warning(
             "GAURAST-Draw-indices-past-buffer",
-            format!("the draw reads indices {first} to {}, but the index buffer holds {}", u64::from(first) + u64::from(count) - 1, has / bytes),
+            format!(
+                "the draw reads indices {first} to {}, but the index buffer holds {}",
+                u64::from(first) + u64::from(count) - 1,
+                has / bytes
+            ),
         );
     }
 }
@@ -289,7 +346,11 @@ pub(crate) fn index_bytes(ty: vk::IndexType) -> u64 {
 /// The end of what is bound, in bytes after the offset.
 fn bound_bytes(recording: &Recording, binding: u32, objects: &Objects) -> Option<u64> {
     let bound = recording.vertex_buffers.get(&binding)?;
-    let size = objects.buffers.get(&bound.buffer)?.size.saturating_sub(bound.offset);
+    let size = objects
+        .buffers
+        .get(&bound.buffer)?
+        .size
+        .saturating_sub(bound.offset);
     Some(bound.size.map_or(size, |given| given.min(size)))
 }
 
@@ -303,7 +364,9 @@ fn check_vertices(
 ) {
     for (location, attribute) in &pipeline.attributes {
         let number = attribute.binding;
-        let Some(binding) = pipeline.bindings.get(&number) else { continue };
+        let Some(binding) = pipeline.bindings.get(&number) else {
+            continue;
+        };
         let Some(bytes) = bound_bytes(recording, number, objects) else {
             if !recording.vertex_buffers.contains_key(&number) {
                 return faults.warning(
@@ -313,18 +376,34 @@ fn check_vertices(
             }
             continue;
         };
-        let stride = recording.vertex_buffers[&number].stride.unwrap_or(binding.stride);
+        let stride = recording.vertex_buffers[&number]
+            .stride
+            .unwrap_or(binding.stride);
         let (what, first, last) = if binding.by_instance {
-            let steps = if binding.divisor == 0 { 0 } else { (instances - 1) / binding.divisor };
-            ("instance", first_instance, u64::from(first_instance) + u64::from(steps))
+            let steps = if binding.divisor == 0 {
+                0
+            } else {
+                (instances - 1) / binding.divisor
+            };
+            (
+                "instance",
+                first_instance,
+                u64::from(first_instance) + u64::from(steps),
+            )
         } else {
-            let Some((first, count)) = by_vertex else { continue };
+            let Some((first, count)) = by_vertex else {
+                continue;
+            };
             ("vertex", first, u64::from(first) + u64::from(count) - 1)
         };
         let size = u64::from(attribute.offset) + u64::from(Format::of(attribute.format).bytes);
         let end = last * u64::from(stride) + size;
         if end > bytes {
-            let holds = if stride == 0 || bytes < size { 0 } else { (bytes - size) / u64::from(stride) + 1 };
+            let holds = if stride == 0 || bytes < size {
+                0
+            } else {
+                (bytes - size) / u64::from(stride) + 1
+            };
             return faults.warning(
                 "GAURAST-Draw-vertices-past-buffer",
                 format!(
@@ -336,9 +415,18 @@ fn check_vertices(
 }
 
 /// Warns of a fragment that replaces what is there.
-fn check_blending(recording: &Recording, pipeline: &Pipeline, viewport: Option<[f32; 4]>, faults: &mut Faults) {
+fn check_blending(
+    recording: &Recording,
+    pipeline: &Pipeline,
+    viewport: Option<[f32; 4]>,
+    faults: &mut Faults,
+) {
     let Some(pass) = &recording.pass else { return };
-    let is_loaded = pass.subpass.colors.first().is_some_and(|&(_, is_loaded)| is_loaded);
+    let is_loaded = pass
+        .subpass
+        .colors
+        .first()
+        .is_some_and(|&(_, is_loaded)| is_loaded);
     let is_drawn = pass.drawn.contains(&viewport);
     if pipeline.replaces && !pipeline.has_fragment && (is_loaded || is_drawn) {
         faults.warning(

@@ -30,12 +30,18 @@ pub(crate) fn check(
     if format.is_integer || format.components < 3 {
         faults.error(
             id,
-            format!("format is {:?}, but must have 3 components or more that are no integers", bound.format),
+            format!(
+                "format is {:?}, but must have 3 components or more that are no integers",
+                bound.format
+            ),
         );
     } else if !is_vertex_format(bound.format) {
         faults.error(
             id,
-            format!("format is {:?}, which does not support VK_FORMAT_FEATURE_VERTEX_BUFFER_BIT", bound.format),
+            format!(
+                "format is {:?}, which does not support VK_FORMAT_FEATURE_VERTEX_BUFFER_BIT",
+                bound.format
+            ),
         );
     } else if bound.stride == 0 && bound.coefficient_stride == 0 {
         faults.warning(

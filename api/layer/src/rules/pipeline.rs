@@ -57,8 +57,11 @@ pub(crate) fn check(request: &Request, facts: &Facts, faults: &mut Faults) {
     check_fixed_function(request, faults);
     check_gates(request, facts, faults);
     if state::is_fixed(&gaussian) {
+        let before = faults.0.len();
         check_degree(&gaussian, facts, faults);
-        check_attributes(&gaussian, request, faults);
+        if faults.0.len() == before {
+            check_attributes(&gaussian, request, faults);
+        }
         check_camera(&gaussian, request, faults);
     }
     if faults.is_empty() {
@@ -113,9 +116,15 @@ fn check_stages(gaussian: &GaussianState, request: &Request, facts: &Facts, faul
     if request.has(others) {
         faults.error(id, "the pipeline has a tessellation, geometry, task or mesh stage, which Gaussians do not pass");
     } else if fixed && has_vertex {
-        faults.error(id, "projectionMode is FIXED_FUNCTION, but the pipeline has a vertex stage");
+        faults.error(
+            id,
+            "projectionMode is FIXED_FUNCTION, but the pipeline has a vertex stage",
+        );
     } else if !fixed && !has_vertex {
-        faults.error(id, "projectionMode is VERTEX_SHADER, but the pipeline has no vertex stage");
+        faults.error(
+            id,
+            "projectionMode is VERTEX_SHADER, but the pipeline has no vertex stage",
+        );
     }
     let interface = |stage: Stage, class: u32| {
         let found = request.stages.iter().find(|other| other.stage == stage)?;
@@ -142,19 +151,30 @@ fn check_fixed_function(request: &Request, faults: &mut Faults) {
         "VUID-VkPipelineInputAssemblyStateCreateInfo-topology-90009",
         || "primitiveRestartEnable is VK_TRUE, but a list of Gaussians has no restart".to_owned(),
     );
-    faults.require(!request.discards, "GAURAST-Pipeline-rasterizer-discard", || {
-        "rasterizerDiscardEnable is VK_TRUE, but must be VK_FALSE (Interactions)".to_owned()
-    });
-    faults.require(request.viewport_count == 1, "GAURAST-Pipeline-viewport-count", || {
-        format!("viewportCount is {}, but must be 1 (Interactions)", request.viewport_count)
-    });
+    faults.require(
+        !request.discards,
+        "GAURAST-Pipeline-rasterizer-discard",
+        || "rasterizerDiscardEnable is VK_TRUE, but must be VK_FALSE (Interactions)".to_owned(),
+    );
+    faults.require(
+        request.viewport_count == 1,
+        "GAURAST-Pipeline-viewport-count",
+        || {
+            format!(
+                "viewportCount is {}, but must be 1 (Interactions)",
+                request.viewport_count
+            )
+        },
+    );
     for state in [
         vk::DynamicState::PRIMITIVE_RESTART_ENABLE,
         vk::DynamicState::RASTERIZER_DISCARD_ENABLE,
     ] {
-        faults.require(!request.is_dynamic(state), "GAURAST-Pipeline-dynamic-state", || {
-            format!("{state:?} must not be dynamic in a Gaussian pipeline (Interactions)")
-        });
+        faults.require(
+            !request.is_dynamic(state),
+            "GAURAST-Pipeline-dynamic-state",
+            || format!("{state:?} must not be dynamic in a Gaussian pipeline (Interactions)"),
+        );
     }
 }
 
@@ -163,7 +183,11 @@ fn check_gates(request: &Request, facts: &Facts, faults: &mut Faults) {
     let features = &facts.features;
     let is_tested = request.tests_depth && request.subpass.depth != vk::Format::UNDEFINED;
     let id = "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianDepthStencil-90044";
-    faults.require(!is_tested || features.gaussian_depth_stencil != 0, id, || state::absent(id));
+    faults.require(
+        !is_tested || features.gaussian_depth_stencil != 0,
+        id,
+        || state::absent(id),
+    );
     let id = "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianMultisample-90045";
     let is_one = request.samples == vk::SampleCountFlags::TYPE_1;
     if !is_one && features.gaussian_multisample == 0 {
@@ -171,15 +195,22 @@ fn check_gates(request: &Request, facts: &Facts, faults: &mut Faults) {
     } else {
         let fits = is_one || facts.sample_counts.contains(request.samples);
         faults.require(fits, id, || {
-            format!("rasterizationSamples is {:?}, but gaussianSampleCounts has {:?}", request.samples, facts.sample_counts)
+            format!(
+                "rasterizationSamples is {:?}, but gaussianSampleCounts has {:?}",
+                request.samples, facts.sample_counts
+            )
         });
     }
     let id = "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianDynamicState-90048";
     let has_own = request.dynamic.iter().any(|&state| is_own(state));
-    faults.require(!has_own || features.gaussian_dynamic_state != 0, id, || state::absent(id));
+    faults.require(!has_own || features.gaussian_dynamic_state != 0, id, || {
+        state::absent(id)
+    });
     let id = "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianMultiview-90049";
     let has_views = request.subpass.view_mask != 0;
-    faults.require(!has_views || features.gaussian_multiview != 0, id, || state::absent(id));
+    faults.require(!has_views || features.gaussian_multiview != 0, id, || {
+        state::absent(id)
+    });
 }
 
 fn check_degree(gaussian: &GaussianState, facts: &Facts, faults: &mut Faults) {
@@ -198,7 +229,11 @@ fn check_degree(gaussian: &GaussianState, facts: &Facts, faults: &mut Faults) {
 /// The locations of an attribute with their names and the components that each needs.
 pub(crate) fn used_locations(gaussian: &GaussianState) -> Vec<(String, u32, u32)> {
     let locations = &gaussian.attribute_locations;
-    let scales = if gaussian.geometry == Geometry::GAUSSIAN_2D { 2 } else { 3 };
+    let scales = if gaussian.geometry == Geometry::GAUSSIAN_2D {
+        2
+    } else {
+        3
+    };
     let mut used = vec![
         ("position".to_owned(), locations.position, 3),
         ("scale".to_owned(), locations.scale, scales),
@@ -207,13 +242,22 @@ pub(crate) fn used_locations(gaussian: &GaussianState) -> Vec<(String, u32, u32)
     ];
     let mut rows = |name: &str, first: u32, count: u32, components: u32| {
         used.extend((0..count).map(|index| {
-            let name = if count > 1 { format!("{name} + {index}") } else { name.to_owned() };
+            let name = if count > 1 {
+                format!("{name} + {index}")
+            } else {
+                name.to_owned()
+            };
             (name, first.saturating_add(index), components)
         }));
     };
     if !gaussian.flags.contains(Flags::SPHERICAL_HARMONICS_BUFFER) {
         let coefficients = (gaussian.spherical_harmonics_degree.min(16) + 1).pow(2);
-        rows("firstSphericalHarmonics", locations.first_spherical_harmonics, coefficients, 3);
+        rows(
+            "firstSphericalHarmonics",
+            locations.first_spherical_harmonics,
+            coefficients,
+            3,
+        );
     }
     if locations.first_model_matrix != UNUSED {
         rows("firstModelMatrix", locations.first_model_matrix, 3, 4);
@@ -227,7 +271,9 @@ pub(crate) fn used_locations(gaussian: &GaussianState) -> Vec<(String, u32, u32)
 fn check_attributes(gaussian: &GaussianState, request: &Request, faults: &mut Faults) {
     let used = used_locations(gaussian);
     for (index, (name, location, _)) in used.iter().enumerate() {
-        let same = used[..index].iter().find(|(_, other, _)| other == location && *other != UNUSED);
+        let same = used[..index]
+            .iter()
+            .find(|(_, other, _)| other == location && *other != UNUSED);
         if let Some((other, ..)) = same {
             return faults.error(
                 "VUID-VkGaussianAttributeLocationsGAURAST-None-90019",
@@ -236,7 +282,9 @@ fn check_attributes(gaussian: &GaussianState, request: &Request, faults: &mut Fa
         }
     }
     let id = "VUID-VkGaussianAttributeLocationsGAURAST-None-90015";
-    let Some((bindings, attributes)) = &request.vertex_input else { return };
+    let Some((bindings, attributes)) = &request.vertex_input else {
+        return;
+    };
     for (name, location, components) in used {
         let Some(attribute) = attributes.get(&location) else {
             let text = if location == UNUSED {
@@ -260,7 +308,10 @@ fn check_attributes(gaussian: &GaussianState, request: &Request, faults: &mut Fa
         if !bindings.contains_key(&attribute.binding) {
             return faults.error(
                 id,
-                format!("{name} is location {location}, whose binding {} does not exist", attribute.binding),
+                format!(
+                    "{name} is location {location}, whose binding {} does not exist",
+                    attribute.binding
+                ),
             );
         }
     }
@@ -307,16 +358,24 @@ fn warn(gaussian: &GaussianState, request: &Request, faults: &mut Faults) {
     if !request.cull_mode.is_empty() && !request.is_dynamic(vk::DynamicState::CULL_MODE) {
         faults.warning(
             "GAURAST-Pipeline-cull-mode",
-            format!("cullMode is {:?}, which has no effect: a Gaussian always faces front", request.cull_mode),
+            format!(
+                "cullMode is {:?}, which has no effect: a Gaussian always faces front",
+                request.cull_mode
+            ),
         );
     }
     if request.polygon_mode != vk::PolygonMode::FILL {
         faults.warning(
             "GAURAST-Pipeline-polygon-mode",
-            format!("polygonMode is {:?}, which has no effect on Gaussians", request.polygon_mode),
+            format!(
+                "polygonMode is {:?}, which has no effect on Gaussians",
+                request.polygon_mode
+            ),
         );
     }
-    if gaussian.transmittance_floor > 0.0 && gaussian.alpha_ceiling > 1.0 - gaussian.transmittance_floor {
+    if gaussian.transmittance_floor > 0.0
+        && gaussian.alpha_ceiling > 1.0 - gaussian.transmittance_floor
+    {
         faults.warning(
             "GAURAST-Pipeline-alpha-ceiling",
             format!(
@@ -332,8 +391,12 @@ fn warn(gaussian: &GaussianState, request: &Request, faults: &mut Faults) {
     if let Some((bindings, attributes)) = &request.vertex_input {
         let is_dynamic = request.is_dynamic(vk::DynamicState::VERTEX_INPUT_BINDING_STRIDE);
         for (name, location, _) in used_locations(gaussian) {
-            let Some(attribute) = attributes.get(&location) else { continue };
-            let Some(binding) = bindings.get(&attribute.binding) else { continue };
+            let Some(attribute) = attributes.get(&location) else {
+                continue;
+            };
+            let Some(binding) = bindings.get(&attribute.binding) else {
+                continue;
+            };
             let end = attribute.offset + Format::of(attribute.format).bytes;
             if is_dynamic || !state::is_fixed(gaussian) || binding.stride >= end {
                 continue;
@@ -351,14 +414,18 @@ fn warn(gaussian: &GaussianState, request: &Request, faults: &mut Faults) {
 
 /// Warns of what becomes of the fragment's colour, which is premultiplied.
 fn warn_of_output(request: &Request, faults: &mut Faults) {
-    let Some(&(format, _)) = request.subpass.colors.first() else { return };
+    let Some(&(format, _)) = request.subpass.colors.first() else {
+        return;
+    };
     if is_integer(format) {
         return faults.warning(
             "GAURAST-Pipeline-integer-attachment",
             format!("the first colour attachment is {format:?}: without a fragment stage integer attachments are left as they are"),
         );
     }
-    let Some(blend) = request.blend.first() else { return };
+    let Some(blend) = request.blend.first() else {
+        return;
+    };
     let nothing_else = !request.writes_depth && request.subpass.colors.len() == 1;
     if blend.color_write_mask.is_empty() && nothing_else {
         return faults.warning(
@@ -370,7 +437,10 @@ fn warn_of_output(request: &Request, faults: &mut Faults) {
         vk::BlendFactor::SRC_ALPHA,
         vk::BlendFactor::SRC_ALPHA_SATURATE,
     ];
-    if blend.blend_enable != 0 && !request.has_logic_op && by_alpha.contains(&blend.src_color_blend_factor) {
+    if blend.blend_enable != 0
+        && !request.has_logic_op
+        && by_alpha.contains(&blend.src_color_blend_factor)
+    {
         faults.warning(
             "GAURAST-Pipeline-blending",
             format!(

@@ -15,7 +15,10 @@ pub(crate) fn begin(recording: &mut Recording, facts: &Facts, faults: &mut Fault
     faults.require(
         facts.features.merged_draws != 0,
         "VUID-vkCmdBeginGaussianSetGAURAST-mergedDraws-90001",
-        || "vkCmdBeginGaussianSetGAURAST is recorded, but the feature mergedDraws is not enabled".to_owned(),
+        || {
+            "vkCmdBeginGaussianSetGAURAST is recorded, but the feature mergedDraws is not enabled"
+                .to_owned()
+        },
     );
     faults.require(
         recording.pass.is_some(),
@@ -53,7 +56,9 @@ pub(crate) fn require_ended(recording: &mut Recording, command: &str, faults: &m
 
 /// A draw of Gaussians: in a set it shares the state of the first one.
 pub(crate) fn check_draw(recording: &mut Recording, faults: &mut Faults) {
-    let Some(pipeline) = recording.pipeline.clone() else { return };
+    let Some(pipeline) = recording.pipeline.clone() else {
+        return;
+    };
     let shared = shared(recording, pipeline);
     match &mut recording.set {
         None => {}
@@ -66,7 +71,9 @@ pub(crate) fn check_draw(recording: &mut Recording, faults: &mut Faults) {
             let differs = if first.cameras == shared.cameras {
                 let mut states = first.dynamic.iter().zip(&shared.dynamic);
                 let other = states.find(|((_, a), (_, b))| a != b);
-                other.map(|((&state, _), _)| format!("the dynamic state {:?}", vk::DynamicState::from_raw(state)))
+                other.map(|((&state, _), _)| {
+                    format!("the dynamic state {:?}", vk::DynamicState::from_raw(state))
+                })
             } else {
                 Some("the camera".to_owned())
             };
@@ -82,7 +89,9 @@ pub(crate) fn check_draw(recording: &mut Recording, faults: &mut Faults) {
 
 fn shared(recording: &Recording, pipeline: Arc<Pipeline>) -> Shared {
     let cameras = recording.cameras.iter().flat_map(|cameras| cameras.iter());
-    let cameras = cameras.flat_map(|camera| format!("{:?}", **camera).into_bytes()).collect();
+    let cameras = cameras
+        .flat_map(|camera| format!("{:?}", **camera).into_bytes())
+        .collect();
     let dynamic = (pipeline.dynamic.iter())
         .map(|state| {
             let value = recording.dynamic.get(&state.as_raw());

@@ -25,15 +25,22 @@ pub(crate) fn check_vertex(
     for (name, location, components) in named {
         if location == UNUSED {
             if name != "depthKey" {
-                return faults.error(id, format!("{name} is unused, but vertex-shader projection needs it"));
+                return faults.error(
+                    id,
+                    format!("{name} is unused, but vertex-shader projection needs it"),
+                );
             }
             continue;
         }
         if let Some((other, _)) = seen.iter().find(|(_, other)| *other == location) {
-            return faults.error(id, format!("{name} and {other} are the same location, {location}"));
+            return faults.error(
+                id,
+                format!("{name} and {other} are the same location, {location}"),
+            );
         }
         seen.push((name, location));
-        let writes = |slots: &Slots| (0..components).all(|c| slots.get(&(location, c)) == Some(&true));
+        let writes =
+            |slots: &Slots| (0..components).all(|c| slots.get(&(location, c)) == Some(&true));
         if outputs.is_some_and(|outputs| !writes(&outputs.slots)) {
             return faults.error(
                 id,
@@ -55,7 +62,10 @@ pub(crate) fn check_fragment(
     let id = "VUID-VkGaussianResolveInputLocationsGAURAST-None-90023";
     let (color, depth) = (locations.accumulated_color, locations.depth);
     if color == depth && color != UNUSED {
-        return faults.error(id, format!("accumulatedColor and depth are the same location, {color}"));
+        return faults.error(
+            id,
+            format!("accumulatedColor and depth are the same location, {color}"),
+        );
     }
     let Some(inputs) = inputs else { return };
     let is_there = |&(&(location, component), &is_float): &(&(u32, u32), &bool)| {
@@ -72,13 +82,17 @@ pub(crate) fn check_fragment(
                 place(depth)
             )
         } else {
-            format!("the fragment shader reads location {location} as something other than 32-bit floating point")
+            format!(
+                "the fragment shader reads location {location} as something other than 32-bit floating point"
+            )
         };
         return faults.error(id, text);
     }
-    faults.require(!inputs.writes_depth, "VUID-VkGraphicsPipelineCreateInfo-FragDepth-90024", || {
-        "the fragment shader writes FragDepth, but depths are those of Gaussians".to_owned()
-    });
+    faults.require(
+        !inputs.writes_depth,
+        "VUID-VkGraphicsPipelineCreateInfo-FragDepth-90024",
+        || "the fragment shader writes FragDepth, but depths are those of Gaussians".to_owned(),
+    );
 }
 
 fn place(location: u32) -> String {

@@ -38,7 +38,8 @@ pub(crate) fn check_enums(state: &State, faults: &mut Faults) -> bool {
             s.geometry.as_raw(),
         ),
         is(
-            s.linearization == Linearization::JACOBIAN || s.linearization == Linearization::UNSCENTED,
+            s.linearization == Linearization::JACOBIAN
+                || s.linearization == Linearization::UNSCENTED,
             "linearization",
             s.linearization.as_raw(),
         ),
@@ -48,13 +49,22 @@ pub(crate) fn check_enums(state: &State, faults: &mut Faults) -> bool {
             "precision",
             s.precision.as_raw(),
         ),
-        is(is_antialiasing(s.antialiasing), "antialiasing", s.antialiasing.as_raw()),
         is(
-            s.camera_source == CameraSource::COMMAND || s.camera_source == CameraSource::UNIFORM_BUFFER,
+            is_antialiasing(s.antialiasing),
+            "antialiasing",
+            s.antialiasing.as_raw(),
+        ),
+        is(
+            s.camera_source == CameraSource::COMMAND
+                || s.camera_source == CameraSource::UNIFORM_BUFFER,
             "cameraSource",
             s.camera_source.as_raw(),
         ),
-        is(known.contains(s.flags), "flags", s.flags.as_raw().cast_signed()),
+        is(
+            known.contains(s.flags),
+            "flags",
+            s.flags.as_raw().cast_signed(),
+        ),
     ];
     match wrong.into_iter().flatten().next() {
         None => true,
@@ -86,7 +96,12 @@ fn check_numbers(state: &State, approximation: Option<[f32; 2]>, faults: &mut Fa
     faults.require(
         s.low_pass_variance.is_finite() && s.low_pass_variance >= 0.0,
         "VUID-VkPipelineGaussianStateCreateInfoGAURAST-lowPassVariance-90011",
-        || format!("lowPassVariance is {}, but must be finite and not negative", s.low_pass_variance),
+        || {
+            format!(
+                "lowPassVariance is {}, but must be finite and not negative",
+                s.low_pass_variance
+            )
+        },
     );
     let floor_is_right = (0.0..=1.0).contains(&s.alpha_floor);
     faults.require(
@@ -110,9 +125,16 @@ fn check_numbers(state: &State, approximation: Option<[f32; 2]>, faults: &mut Fa
     faults.require(
         (0.0..1.0).contains(&s.transmittance_floor),
         "VUID-VkPipelineGaussianStateCreateInfoGAURAST-transmittanceFloor-90014",
-        || format!("transmittanceFloor is {}, but must be in [0, 1)", s.transmittance_floor),
+        || {
+            format!(
+                "transmittanceFloor is {}, but must be in [0, 1)",
+                s.transmittance_floor
+            )
+        },
     );
-    let Some([error, budget]) = approximation else { return };
+    let Some([error, budget]) = approximation else {
+        return;
+    };
     faults.require(
         (0.0..=1.0).contains(&error),
         "VUID-VkPipelineGaussianApproximationStateCreateInfoGAURAST-exponentialError-90051",
@@ -150,7 +172,10 @@ fn check_combinations(state: &State, has_fragment: bool, faults: &mut Faults) {
     faults.require(
         !fixed || !has_matrix || !is_per_pixel && !is_flat,
         "VUID-VkPipelineGaussianStateCreateInfoGAURAST-firstModelMatrix-90028",
-        || "firstModelMatrix is used, but order is PER_PIXEL or geometry is not GAUSSIAN_3D".to_owned(),
+        || {
+            "firstModelMatrix is used, but order is PER_PIXEL or geometry is not GAUSSIAN_3D"
+                .to_owned()
+        },
     );
     faults.require(
         !fixed || !is_flat || s.linearization == Linearization::JACOBIAN,
