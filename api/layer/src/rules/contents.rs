@@ -14,6 +14,7 @@ use crate::formats::Format;
 use crate::objects::BufferDescriptor;
 use crate::recording::{Call, Draw};
 use crate::report::Faults;
+use crate::rules::pipeline::used_locations;
 use crate::rules::{camera, draw};
 
 /// The most Gaussians of a draw that are looked at: the first ones.
@@ -37,7 +38,10 @@ pub(crate) trait Reader {
 
 /// Checks a draw's contents.
 pub(crate) fn check(draw: &Draw, reader: &dyn Reader, facts: &Facts, faults: &mut Faults) {
-    let Ok(cameras) = cameras(draw, reader, facts, faults) else {
+    let before = faults.0.len();
+    let cameras = cameras(draw, reader, facts, faults);
+    // What a wrong camera sees says nothing of the Gaussians.
+    let Some(cameras) = cameras.filter(|_| faults.0.len() == before) else {
         return;
     };
     let Some(call) = direct(draw.call, reader, facts, faults) else {
@@ -49,26 +53,27 @@ pub(crate) fn check(draw: &Draw, reader: &dyn Reader, facts: &Facts, faults: &mu
     count(draw, &gaussians, cameras.first(), faults);
 }
 
-/// The cameras of a draw; of those in a uniform buffer, the rules are checked.
+/// The cameras of a draw, as far as they are known; of those in a uniform buffer, the rules are checked. Without the buffer
+/// there are none.
 fn cameras(
     draw: &Draw,
     reader: &dyn Reader,
     facts: &Facts,
     faults: &mut Faults,
-) -> Result<Vec<Camera>, ()> {
+) -> Option<Vec<Camera>> {
     if draw.state.camera_source == CameraSource::COMMAND {
         let cameras = draw.cameras.as_deref();
-        return Ok(cameras.cloned().unwrap_or_default());
+        return Some(cameras.cloned().unwrap_or_default());
     }
     let Some(found) = reader.descriptor(draw) else {
-        return Ok(Vec::new());
+        return Some(Vec::new());
     };
     let id = "VUID-VkPipelineGaussianStateCreateInfoGAURAST-cameraBinding-90025";
     let (buffer, offset, range) = match found {
         Ok(found) => found,
         Err(text) => {
             faults.error(id, text);
-            return Err(());
+            return None;
         }
     };
     let count = u64::from(draw.state.camera_count);
@@ -83,12 +88,11 @@ fn cameras(
             id,
             format!("the descriptor of the camera has a range of {range} bytes, but must have {element} times cameraCount ({count})"),
         );
-        return Err(());
+        return None;
     }
     let Some(bytes) = reader.read(buffer, offset, count * element) else {
-        return Ok(Vec::new());
+        return Some(Vec::new());
     };
-    let before = faults.0.len();
     let elements = bytes.chunks_exact(element as usize).enumerate();
     let cameras: Vec<_> = elements
         .map(|(index, bytes)| {
@@ -103,8 +107,7 @@ fn cameras(
             camera
         })
         .collect();
-    let is_right = faults.0[before..].iter().all(|fault| !fault.is_error);
-    if is_right { Ok(cameras) } else { Err(()) }
+    Some(cameras)
 }
 
 /// A camera from the 128 bytes of a `VkGaussianCameraDataGAURAST`.
@@ -168,18 +171,29 @@ struct Elements {
     stride: u64,
 }
 
+/// An attribute, ready to be read.
+struct Source {
+    format: Format,
+    offset: u64,
+    /// How many instances take the same element, if it advances by instance; 0: all of them.
+    divisor: Option<u64>,
+    /// The place of its elements among those of all bindings.
+    elements: usize,
+}
+
 /// The Gaussians of a draw, where the layer can read them.
-struct Gaussians<'a> {
-    draw: &'a Draw,
-    elements: BTreeMap<u32, Elements>,
+struct Gaussians {
+    /// By location.
+    sources: Vec<Option<Source>>,
+    elements: Vec<Elements>,
     vertices: Vec<u64>,
     first_instance: u64,
     instances: u64,
     total: u64,
 }
 
-impl<'a> Gaussians<'a> {
-    fn of(draw: &'a Draw, call: Call, reader: &dyn Reader, faults: &mut Faults) -> Option<Self> {
+impl Gaussians {
+    fn of(draw: &Draw, call: Call, reader: &dyn Reader, faults: &mut Faults) -> Option<Self> {
         let (numbers, vertices) = match call {
             Call::Vertices(numbers) => {
                 let [first, count, ..] = numbers.map(u64::from);
@@ -201,47 +215,74 @@ impl<'a> Gaussians<'a> {
             return None;
         }
         let mut gaussians = Self {
-            draw,
-            elements: BTreeMap::new(),
+            sources: Vec::new(),
+            elements: Vec::new(),
             vertices,
             first_instance,
             instances: looked_at,
             total: count * instances,
         };
-        for (_, location, _) in crate::rules::pipeline::used_locations(&draw.state) {
+        let mut places = BTreeMap::new();
+        for (_, location, _) in used_locations(&draw.state) {
             let attribute = draw.pipeline.attributes.get(&location)?;
-            if !Format::of(attribute.format).is_readable() {
+            let format = Format::of(attribute.format);
+            let binding = draw.pipeline.bindings.get(&attribute.binding)?;
+            let divisor = binding.by_instance.then_some(u64::from(binding.divisor));
+            let (first, last) = match divisor {
+                Some(divisor) => {
+                    let steps = (looked_at - 1).checked_div(divisor);
+                    (first_instance, first_instance + steps.unwrap_or(0))
+                }
+                None => (low, high),
+            };
+            if !format.is_readable() {
                 return None;
             }
-            let binding = draw.pipeline.bindings.get(&attribute.binding)?;
-            let (first, last) = if binding.by_instance {
-                let steps = (looked_at - 1).checked_div(u64::from(binding.divisor));
-                (first_instance, first_instance + steps.unwrap_or(0))
-            } else {
-                (low, high)
+            let elements = match places.get(&attribute.binding) {
+                Some(&place) => place,
+                None => {
+                    let elements = read_elements(draw, attribute.binding, (first, last), reader)?;
+                    gaussians.elements.push(elements);
+                    let place = gaussians.elements.len() - 1;
+                    places.insert(attribute.binding, place);
+                    place
+                }
             };
-            if !gaussians.elements.contains_key(&attribute.binding) {
-                let elements = read_elements(draw, attribute.binding, (first, last), reader)?;
-                gaussians.elements.insert(attribute.binding, elements);
-            }
+            let source = Source {
+                format,
+                offset: u64::from(attribute.offset),
+                divisor,
+                elements,
+            };
+            gaussians.add(location, source)?;
         }
         Some(gaussians)
     }
 
+    /// Adds an attribute; `None` beyond all locations that devices have.
+    fn add(&mut self, location: u32, source: Source) -> Option<()> {
+        let location = usize::try_from(location)
+            .ok()
+            .filter(|&location| location < 1024)?;
+        if self.sources.len() <= location {
+            self.sources.resize_with(location + 1, || None);
+        }
+        self.sources[location] = Some(source);
+        Some(())
+    }
+
     /// An attribute of a Gaussian; `None` beyond its buffer.
     fn attribute(&self, location: u32, vertex: u64, instance: u64) -> Option<[f32; 4]> {
-        let attribute = self.draw.pipeline.attributes.get(&location)?;
-        let binding = self.draw.pipeline.bindings.get(&attribute.binding)?;
-        let elements = self.elements.get(&attribute.binding)?;
-        let index = if binding.by_instance {
-            let steps = instance.checked_div(u64::from(binding.divisor));
-            self.first_instance + steps.unwrap_or(0)
-        } else {
-            vertex
+        let source = self.sources.get(location as usize)?.as_ref()?;
+        let elements = &self.elements[source.elements];
+        let index = match source.divisor {
+            Some(divisor) => self.first_instance + instance.checked_div(divisor).unwrap_or(0),
+            None => vertex,
         };
-        let offset =
-            index.checked_sub(elements.first)? * elements.stride + u64::from(attribute.offset);
-        Format::of(attribute.format).read(&elements.bytes, usize::try_from(offset).ok()?)
+        let offset = index.checked_sub(elements.first)? * elements.stride + source.offset;
+        source
+            .format
+            .read(&elements.bytes, usize::try_from(offset).ok()?)
     }
 }
 
@@ -362,7 +403,7 @@ struct Counts {
     no_model_opacity: u64,
 }
 
-fn count(draw: &Draw, gaussians: &Gaussians<'_>, camera: Option<&Camera>, faults: &mut Faults) {
+fn count(draw: &Draw, gaussians: &Gaussians, camera: Option<&Camera>, faults: &mut Faults) {
     let mut counts = Counts::default();
     for instance in 0..gaussians.instances {
         for &vertex in &gaussians.vertices {
@@ -387,7 +428,7 @@ struct Gaussian {
     harmonics_are_finite: bool,
 }
 
-fn fetch(draw: &Draw, gaussians: &Gaussians<'_>, vertex: u64, instance: u64) -> Option<Gaussian> {
+fn fetch(draw: &Draw, gaussians: &Gaussians, vertex: u64, instance: u64) -> Option<Gaussian> {
     let locations = &draw.state.attribute_locations;
     let get = |location: u32| gaussians.attribute(location, vertex, instance);
     let three = |location: u32| get(location).map(|[x, y, z, _]| [x, y, z]);
