@@ -164,7 +164,7 @@ pub const IDENTITY: Model = [
 pub fn instanced() -> Graphics<'static> {
     let mut request =
         with(|s| s.attribute_locations(locations().first_model_matrix(9).model_opacity(12)));
-    let row = |row| attribute(9 + row, 1, vk::Format::R32G32B32A32_SFLOAT, 4 * row);
+    let row = |row: u32| attribute(9 + row, 1, vk::Format::R32G32B32A32_SFLOAT, 4 * row);
     request.attributes.extend((0..3).map(row));
     request
         .attributes

@@ -82,8 +82,7 @@ unsafe extern "system" fn get_instance_proc_addr(
     }
     // SAFETY: the instance is valid.
     let own = unsafe { Instance::of(instance) }?;
-    // SAFETY: whatever its type is, it is only passed on.
-    let next = unsafe { own.next::<Function>(command) }?;
+    let next = own.next_by_name(command)?;
     let get_device: vk::PFN_vkGetDeviceProcAddr = get_device_proc_addr;
     if command == c"vkGetDeviceProcAddr" {
         // SAFETY: as above.
@@ -92,7 +91,7 @@ unsafe extern "system" fn get_instance_proc_addr(
         };
     }
     let hook = hooks::instance_hook(command).or_else(|| hooks::device_hook(command));
-    Some(plain(hook.unwrap_or(next)))
+    Some(hook.map_or(next, plain))
 }
 
 /// `vkGetDeviceProcAddr`.

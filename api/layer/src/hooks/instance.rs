@@ -54,7 +54,7 @@ pub(super) unsafe extern "system" fn destroy_instance(
         let Some(forgotten) = Instance::forget(instance) else {
             return;
         };
-        if let Some(destroy) = forgotten.next::<vk::PFN_vkDestroyInstance>(c"vkDestroyInstance") {
+        if let Some(destroy) = forgotten.next.destroy {
             destroy(instance, allocator);
         }
     }
@@ -71,8 +71,7 @@ pub(super) unsafe extern "system" fn create_messenger(
         let Some(own) = Instance::of(instance) else {
             return vk::Result::ERROR_INITIALIZATION_FAILED;
         };
-        type Create = vk::PFN_vkCreateDebugUtilsMessengerEXT;
-        let Some(create) = own.next::<Create>(c"vkCreateDebugUtilsMessengerEXT") else {
+        let Some(create) = own.next.create_messenger else {
             return vk::Result::ERROR_EXTENSION_NOT_PRESENT;
         };
         let result = create(instance, info, allocator, messenger);
@@ -94,8 +93,7 @@ pub(super) unsafe extern "system" fn destroy_messenger(
             return;
         };
         own.messengers.remove(messenger);
-        type Destroy = vk::PFN_vkDestroyDebugUtilsMessengerEXT;
-        if let Some(destroy) = own.next::<Destroy>(c"vkDestroyDebugUtilsMessengerEXT") {
+        if let Some(destroy) = own.next.destroy_messenger {
             destroy(instance, messenger, allocator);
         }
     }
@@ -177,12 +175,9 @@ unsafe fn look(
 /// # Safety
 /// The physical device is valid.
 unsafe fn supported(physical_device: vk::PhysicalDevice, instance: &Instance) -> Option<Features> {
-    type Get = vk::PFN_vkGetPhysicalDeviceFeatures2;
     // SAFETY: the caller's promise; the structures are valid.
     unsafe {
-        let get = instance
-            .next::<Get>(c"vkGetPhysicalDeviceFeatures2")
-            .or_else(|| instance.next::<Get>(c"vkGetPhysicalDeviceFeatures2KHR"))?;
+        let get = instance.next.features?;
         let mut own = FeaturesStructure::default();
         let mut all = vk::PhysicalDeviceFeatures2::default().push_next(&mut own);
         get(physical_device, &raw mut all);
@@ -198,23 +193,18 @@ unsafe fn facts(
     is_enabled: bool,
     features: Option<Features>,
 ) -> Facts {
-    type Get = vk::PFN_vkGetPhysicalDeviceProperties2;
     let none = Features::of(&FeaturesStructure::default());
     let mut own = Properties::default();
     let mut views = vk::PhysicalDeviceMultiviewProperties::default();
     let mut memory = vk::PhysicalDeviceMemoryProperties::default();
     // SAFETY: the caller's promise; the structures are valid.
     unsafe {
-        let get = instance
-            .next::<Get>(c"vkGetPhysicalDeviceProperties2")
-            .or_else(|| instance.next::<Get>(c"vkGetPhysicalDeviceProperties2KHR"));
-        if let Some(get) = get {
+        if let Some(get) = instance.next.properties {
             let all = vk::PhysicalDeviceProperties2::default().push_next(&mut views);
             let mut all = all.push_next(&mut own);
             get(physical_device, &raw mut all);
         }
-        type GetMemory = vk::PFN_vkGetPhysicalDeviceMemoryProperties;
-        if let Some(get) = instance.next::<GetMemory>(c"vkGetPhysicalDeviceMemoryProperties") {
+        if let Some(get) = instance.next.memory_properties {
             get(physical_device, &raw mut memory);
         }
     }

@@ -465,10 +465,7 @@ records! {
         let Some(bound) = buffer.as_ref() else { return };
         let fetches = |format| {
             let mut properties = vk::FormatProperties::default();
-            let get = own.instance.next::<vk::PFN_vkGetPhysicalDeviceFormatProperties>(
-                c"vkGetPhysicalDeviceFormatProperties",
-            );
-            let Some(get) = get else { return true };
+            let Some(get) = own.instance.next.format_properties else { return true };
             get(own.physical_device, format, &raw mut properties);
             properties.buffer_features.contains(vk::FormatFeatureFlags::VERTEX_BUFFER)
         };
