@@ -9,10 +9,9 @@ use gaurast::vk::{
 use gaurast_testkit::{Bindings, Buffer, Graphics, Resource};
 
 use crate::pipelines::allowing;
-use crate::spirv;
 use crate::stage::{
-    Mistake, State, creation, instanced, laid_out, mistake, pipeline, resolved, shaded, splats,
-    with,
+    Mistake, State, creation, instanced, laid_out, mistake, pipeline, resolved, shaded, spirv,
+    splats, with,
 };
 
 /// A pipeline on the device without optional modes.

@@ -19,7 +19,9 @@ pub fn mistakes() -> Vec<Mistake> {
     vec![
         pipeline("no attribute of the rotation", missing, || {
             let mut request = splats();
-            request.attributes.retain(|attribute| attribute.location != 2);
+            request
+                .attributes
+                .retain(|attribute| attribute.location != 2);
             request
         }),
         pipeline("the opacity's location is unused", missing, || {

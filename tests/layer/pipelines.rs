@@ -9,9 +9,8 @@ use gaurast::vk::{
 };
 use gaurast_testkit::{Bindings, Buffer, Graphics, Resource, Shader, blend};
 
-use crate::spirv;
 use crate::stage::{
-    Mistake, State, creation, instanced, mistake, pipeline, shaded, shaders, splats, with,
+    Mistake, State, creation, instanced, mistake, pipeline, shaded, shaders, spirv, splats, with,
 };
 
 pub fn allowing(exponential_error: f32, contribution_budget: f32) -> Graphics<'static> {

@@ -14,10 +14,9 @@ use gaurast_testkit::{
 use crate::contents::bytes;
 use crate::harmonics::Addressed;
 use crate::pipelines::allowing;
-use crate::spirv;
 use crate::stage::{
     IDENTITY, OPACITY, SCALE, SIZE, SPLAT, State, camera, drawing, drawn, gaussian, instanced,
-    laid_out, resolved, shaded, splat, splats, with,
+    laid_out, resolved, shaded, spirv, splat, splats, with,
 };
 
 /// A right use: what it is, and what is said of it.

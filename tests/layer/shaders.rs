@@ -4,8 +4,7 @@ use gaurast::vk::{
     GAUSSIAN_LOCATION_UNUSED_GAURAST as UNUSED, GaussianOrderGAURAST, GaussianPrecisionGAURAST,
 };
 
-use crate::spirv;
-use crate::stage::{Mistake, outputs, resolved, shaded, shaders};
+use crate::stage::{Mistake, outputs, resolved, shaded, shaders, spirv};
 
 pub fn mistakes() -> Vec<Mistake> {
     let written = "VUID-VkGaussianVertexOutputLocationsGAURAST-None-90020";

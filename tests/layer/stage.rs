@@ -178,7 +178,6 @@ pub fn instanced() -> Graphics<'static> {
 }
 
 /// The SPIR-V of a shader beside the compiler's tests.
-#[macro_export]
 macro_rules! spirv {
     ($name:literal) => {
         bytemuck::pod_collect_to_vec::<u8, u32>(include_bytes!(concat!(
@@ -189,6 +188,7 @@ macro_rules! spirv {
         )))
     };
 }
+pub(crate) use spirv;
 
 /// A set with a storage buffer, which the shaders read, and the pipeline that `request` becomes with it.
 pub fn laid_out(gpu: &Gpu, request: Graphics<'static>) -> (Graphics<'static>, Bindings, Buffer) {
@@ -221,7 +221,10 @@ pub fn shaded(change: impl FnOnce(State) -> State) -> Graphics<'static> {
                 .vertex_output_locations(outputs()),
         )
     });
-    request.with_shader(Shader::vertex(spirv!("gaussian.vert")))
+    // The shader takes harmonics from its storage buffer.
+    let mut request = request.with_shader(Shader::vertex(spirv!("gaussian.vert")));
+    request.attributes.truncate(4);
+    request
 }
 
 /// A pipeline with a resolve shader that finds what was accumulated and depths at these locations.
