@@ -240,7 +240,7 @@ fn uploads() -> Vec<Mistake> {
                 unsafe {
                     commands
                         .device()
-                        .cmd_update_buffer(commands.raw, buffer, 0, bytes)
+                        .cmd_update_buffer(commands.raw, buffer, 0, bytes);
                 };
             })
         }),
@@ -307,7 +307,7 @@ fn cameras() -> Vec<Mistake> {
                     ..with(|s| s.camera_source(source))
                 };
                 drawing(&stage.full, &request, &[SPLAT], |commands| {
-                    commands.draw(0..1)
+                    commands.draw(0..1);
                 })
             },
         ),

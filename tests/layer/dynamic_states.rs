@@ -21,7 +21,7 @@ type Set = fn(&Device, vk::CommandBuffer);
 fn value(name: &'static str, id: &'static str, set: Set) -> Mistake {
     mistake(name, id, move |stage| {
         recording(&stage.full, |commands| {
-            set(gaussian(&stage.full), commands.raw)
+            set(gaussian(&stage.full), commands.raw);
         })
     })
 }

@@ -93,7 +93,7 @@ pub fn mistakes() -> Vec<Mistake> {
                         unsafe {
                             commands
                                 .device()
-                                .cmd_execute_commands(commands.raw, &[secondary.raw])
+                                .cmd_execute_commands(commands.raw, &[secondary.raw]);
                         };
                     });
                 })

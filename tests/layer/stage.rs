@@ -293,12 +293,15 @@ pub fn gaussian(gpu: &Gpu) -> &gaussian_primitive_topology::Device {
     gpu.gaussian().expect("a device that draws Gaussians")
 }
 
+/// Makes a mistake, and gives all that was said.
+type Make = Box<dyn Fn(&Stage) -> Vec<Message>>;
+
 /// A mistake, and the message that names it.
 pub struct Mistake {
     pub name: &'static str,
     pub id: &'static str,
     /// Makes it; gives all that was said.
-    pub make: Box<dyn Fn(&Stage) -> Vec<Message>>,
+    pub make: Make,
 }
 
 pub fn mistake(

@@ -63,13 +63,7 @@ impl Device {
         facts: Facts,
     ) -> Self {
         // SAFETY: the next layer gives its own commands by name.
-        let next = unsafe {
-            Next::load(|name| {
-                let found = get_device_proc_addr(handle, name.as_ptr());
-                // SAFETY: both are types of functions without parameters.
-                found.map(|found| std::mem::transmute::<unsafe extern "system" fn(), _>(found))
-            })
-        };
+        let next = unsafe { Next::load(|name| get_device_proc_addr(handle, name.as_ptr())) };
         Self {
             handle,
             physical_device,

@@ -182,7 +182,7 @@ impl Objects {
                 // SAFETY: the application has mapped these bytes, and unmaps them or frees the memory only by commands that wait
                 // for the lock that the caller holds. It may write them meanwhile: they are numbers, any of which is a value.
                 unsafe {
-                    std::ptr::copy_nonoverlapping(from as *const u8, bytes.as_mut_ptr(), length)
+                    std::ptr::copy_nonoverlapping(from as *const u8, bytes.as_mut_ptr(), length);
                 };
                 Some(bytes)
             }

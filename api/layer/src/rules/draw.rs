@@ -93,7 +93,7 @@ fn with_dynamic(
             gvk::DYNAMIC_STATE_GAUSSIAN_ALPHA_FLOOR_GAURAST => s.alpha_floor = float,
             gvk::DYNAMIC_STATE_GAUSSIAN_ALPHA_CEILING_GAURAST => s.alpha_ceiling = float,
             gvk::DYNAMIC_STATE_GAUSSIAN_TRANSMITTANCE_FLOOR_GAURAST => {
-                s.transmittance_floor = float
+                s.transmittance_floor = float;
             }
             gvk::DYNAMIC_STATE_GAUSSIAN_EXPONENTIAL_ERROR_GAURAST => approximation[0] = float,
             gvk::DYNAMIC_STATE_GAUSSIAN_CONTRIBUTION_BUDGET_GAURAST => approximation[1] = float,
@@ -380,11 +380,7 @@ fn check_vertices(
             .stride
             .unwrap_or(binding.stride);
         let (what, first, last) = if binding.by_instance {
-            let steps = if binding.divisor == 0 {
-                0
-            } else {
-                (instances - 1) / binding.divisor
-            };
+            let steps = (instances - 1).checked_div(binding.divisor).unwrap_or(0);
             (
                 "instance",
                 first_instance,
