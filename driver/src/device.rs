@@ -13,6 +13,8 @@ use crate::queue::Queue;
 use crate::registry;
 use crate::registry::features::{Features, SUPPORTED, extension_of};
 use ash::vk;
+use gaurast::gaussian_primitive_topology;
+use gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST as GaussianFeatures;
 use simdevice::CommandProcessor;
 use std::collections::HashMap;
 use std::ffi::CStr;
@@ -293,14 +295,37 @@ pub(crate) unsafe fn create_device(
         )?;
         let extensions = resolve_extensions(registry::extensions::DEVICE, &names)?;
         let features = requested_features(info, &extensions)?;
+        let instance = physical_device.require_instance()?;
+        if extensions.contains(&gaussian_primitive_topology::NAME)
+            && valid::find_in_chain::<GaussianFeatures<'_>>(info.p_next).is_none()
+        {
+            warn_of_lost_features(&instance);
+        }
         Device::new(
-            physical_device.require_instance()?,
+            instance,
             extensions,
             features,
             environment::open_device()?,
             &queue_families(info)?,
         )
     }
+}
+
+/// Says that the extension is enabled and nothing of it can be used, as where a layer drops the structure of its features.
+fn warn_of_lost_features(instance: &Instance) {
+    let text = format!(
+        "vkCreateDevice: {} is enabled, but the pNext chain has no \
+         VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST, so that no pipeline may draw Gaussians. The Khronos \
+         validation layer drops structures that it does not know: name them in VK_LAYER_CUSTOM_STYPE_LIST",
+        gaussian_primitive_topology::NAME.to_string_lossy()
+    );
+    log::warn!("{text}");
+    instance.report(
+        vk::DebugUtilsMessageSeverityFlagsEXT::WARNING,
+        vk::DebugUtilsMessageTypeFlagsEXT::GENERAL,
+        "GAURAST-no-features",
+        &text,
+    );
 }
 
 #[doc(alias = "vkDestroyDevice")]

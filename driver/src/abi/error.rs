@@ -17,9 +17,9 @@ pub(crate) enum Error {
         raw: u64,
     },
     /// A null pointer where Vulkan requires a valid one.
-    #[error("a required pointer to {what} is null")]
+    #[error("a required pointer to {} is null", vulkan_type(what))]
     NullPointer {
-        /// The type of the pointer's target.
+        /// The type pointed at, as Rust names it, or the parameter.
         what: &'static str,
     },
     /// A command that this driver doesn't execute.
@@ -100,9 +100,7 @@ impl Error {
     /// The result that the application receives.
     pub(crate) fn result(&self) -> vk::Result {
         match self {
-            Self::InvalidHandle { .. } | Self::NullPointer { .. } | Self::Panic(_) => {
-                vk::Result::ERROR_UNKNOWN
-            }
+            Self::InvalidHandle { .. } | Self::Panic(_) => vk::Result::ERROR_UNKNOWN,
             Self::Unsupported { .. }
             | Self::FeatureNotPresent(_)
             | Self::FeatureNotEnabled { .. } => vk::Result::ERROR_FEATURE_NOT_PRESENT,
@@ -118,7 +116,9 @@ impl Error {
             Self::LayerNotPresent(_) => vk::Result::ERROR_LAYER_NOT_PRESENT,
             Self::ExtensionNotPresent(_) => vk::Result::ERROR_EXTENSION_NOT_PRESENT,
             Self::FormatNotSupported(_) => vk::Result::ERROR_FORMAT_NOT_SUPPORTED,
-            Self::InvalidUsage { .. } => vk::Result::ERROR_VALIDATION_FAILED_EXT,
+            Self::InvalidUsage { .. } | Self::NullPointer { .. } => {
+                vk::Result::ERROR_VALIDATION_FAILED_EXT
+            }
         }
     }
 
@@ -145,5 +145,39 @@ impl Error {
                 | Self::InvalidHandle { .. }
                 | Self::NullPointer { .. }
         )
+    }
+}
+
+/// Vulkan's name of a type that Rust names by its path; other names stay as they are.
+fn vulkan_type(name: &str) -> String {
+    let path = name.split('<').next().unwrap_or(name);
+    match path.rsplit_once("::") {
+        Some((_, own)) => format!("Vk{own}"),
+        None => path.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gaurast::vk::GaussianCameraGAURAST;
+
+    #[test]
+    fn a_null_pointer_is_named_as_vulkan_names_it() {
+        for (what, name) in [
+            (
+                std::any::type_name::<GaussianCameraGAURAST<'_>>(),
+                "VkGaussianCameraGAURAST",
+            ),
+            (std::any::type_name::<vk::BufferCopy>(), "VkBufferCopy"),
+            ("pName", "pName"),
+        ] {
+            let error = Error::NullPointer { what };
+            assert_eq!(
+                error.to_string(),
+                format!("a required pointer to {name} is null")
+            );
+            assert_eq!(error.result(), vk::Result::ERROR_VALIDATION_FAILED_EXT);
+        }
     }
 }

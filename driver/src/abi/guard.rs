@@ -107,7 +107,12 @@ pub(crate) fn guard<C: Caller, R: ReturnCode>(
 
 /// Logs an error and reports it to the listener.
 fn report(reporter: Option<&dyn Reporter>, command: &str, error: &Error) {
-    log::error!("{command}: {error} [{}]", error.message_id());
+    let (text, id) = (error.to_string(), error.message_id());
+    if text.contains(id) {
+        log::error!("{command}: {text}");
+    } else {
+        log::error!("{command}: {text} [{id}]");
+    }
     if let Some(reporter) = reporter {
         reporter.report_error(command, error);
     }

@@ -7,6 +7,7 @@ use crate::physical_device::limits;
 use gaurast::vk::{GaussianCameraDataGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST};
 use simdevice::packet::BufferRange;
 use simdevice::state::gaussian::{Camera, CameraModel};
+use std::fmt::Debug;
 
 /// Converts a camera for the device.
 ///
@@ -102,46 +103,55 @@ pub(super) fn read(range: &BufferRange, number: usize) -> Result<Camera, Error> 
 fn validate(camera: &GaussianCameraGAURAST, model: CameraModel) -> Result<(), Error> {
     let finite = |values: &[f32]| values.iter().all(|value| value.is_finite());
     let c = camera;
-    let rules = [
+    let rules: [(bool, &str, &str, &dyn Debug); 7] = [
         (
             finite(&c.rotation),
             "VUID-VkGaussianCameraGAURAST-rotation-90064",
             "rotation must be finite",
+            &c.rotation,
         ),
         (
             c.eye.iter().all(|value| value.is_finite()),
             "VUID-VkGaussianCameraGAURAST-eye-90065",
             "eye must be finite",
+            &c.eye,
         ),
         (
             finite(&c.focal_length) && c.focal_length.iter().all(|&f| f > 0.0),
             "VUID-VkGaussianCameraGAURAST-focalLength-90068",
             "focalLength must be finite and greater than 0",
+            &c.focal_length,
         ),
         (
             finite(&c.principal_point),
             "VUID-VkGaussianCameraGAURAST-principalPoint-90066",
             "principalPoint must be finite",
+            &c.principal_point,
         ),
         (
             (c.near_plane > 0.0 || model == CameraModel::Orthographic) && c.near_plane.is_finite(),
             "VUID-VkGaussianCameraGAURAST-nearPlane-90069",
             "nearPlane must be finite, and greater than 0 unless the camera is orthographic",
+            &c.near_plane,
         ),
         (
             c.far_plane > c.near_plane,
             "VUID-VkGaussianCameraGAURAST-farPlane-90070",
             "farPlane must be greater than nearPlane",
+            &c.far_plane,
         ),
         (
             finite(&c.depth_coefficients),
             "VUID-VkGaussianCameraGAURAST-depthCoefficients-90067",
             "depthCoefficients must be finite",
+            &c.depth_coefficients,
         ),
     ];
     match rules.iter().find(|(holds, ..)| !holds) {
         None => Ok(()),
-        Some((_, vuid, rule)) => Err(Error::usage(*vuid, format!("{rule}; the camera is {c:?}"))),
+        Some((_, vuid, rule, value)) => {
+            Err(Error::usage(*vuid, format!("{rule}, but is {value:?}")))
+        }
     }
 }
 

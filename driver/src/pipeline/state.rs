@@ -12,8 +12,8 @@ use crate::registry::features::SUPPORTED;
 use crate::shader_module::ShaderStage;
 use ash::vk;
 use gaurast::vk::{
-    PipelineGaussianApproximationStateCreateInfoGAURAST,
-    PipelineGaussianFootprintStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+    GAUSSIAN_LOCATION_UNUSED_GAURAST, PipelineGaussianApproximationStateCreateInfoGAURAST,
+    PipelineGaussianStateCreateInfoGAURAST,
 };
 use simdevice::Format;
 use simdevice::state::gaussian::GaussianState;
@@ -468,7 +468,11 @@ pub(crate) fn attribute(
     let refuse = |what: String| {
         Error::usage(
             "VUID-VkGaussianAttributeLocationsGAURAST-None-90015",
-            format!("{name} is location {location}, {what}"),
+            if location == GAUSSIAN_LOCATION_UNUSED_GAURAST {
+                format!("{name} is unused, but the pipeline reads it")
+            } else {
+                format!("{name} is location {location}, {what}")
+            },
         )
     };
     let source = source(&info.vertex_input, location).map_err(refuse)?;

@@ -1,6 +1,8 @@
 //! Drivers that the Vulkan loader finds, by manifests in the environment.
 
+use std::ffi::CStr;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use ash::vk::TaggedStructure;
 use gaurast_runner::Case;
@@ -22,19 +24,54 @@ pub fn manifest(folder: &Path) -> PathBuf {
     path
 }
 
-/// Runs `inside` in a process of its own, in which the loader finds only this driver. The test needs the loader.
+/// The validation layer of the extension.
+pub const LAYER: &CStr = c"VK_LAYER_GAURAST_validation";
+
+/// Builds the extension's validation layer, and writes its manifest to `folder`, as [`manifest`] does for the driver.
 ///
 /// # Panics
-/// If `inside` fails.
-pub fn through_the_loader(case: &Case, inside: impl FnOnce()) {
-    through_the_loader_with(case, &[], inside);
+/// As [`manifest`].
+pub fn layer_manifest(folder: &Path) -> PathBuf {
+    let name = "libVkLayer_gaurast_validation.so";
+    let library = gaurast_runner::built_library("gaurast-layer", name);
+    let library = library.to_str().expect("a path of Unicode");
+    let template = include_str!("../../../api/layer/gaurast_layer.json");
+    let text = template.replace(&format!("../../target/release/{name}"), library);
+    assert!(text.contains(library), "the template names the library");
+    let path = folder.join("gaurast_layer.json");
+    std::fs::write(&path, text).expect("the manifest is written");
+    path
 }
 
-/// As [`through_the_loader`], with further variables in the environment of the process.
+/// Runs `inside` in a process of its own, where the loader finds this driver alone. The test needs the loader.
 ///
 /// # Panics
 /// If it fails there.
-pub fn through_the_loader_with(case: &Case, variables: &[(&str, &str)], inside: impl FnOnce()) {
+pub fn through_the_loader(case: &Case, inside: impl FnOnce()) {
+    loaded(case, |_, _| (), inside);
+}
+
+/// As [`through_the_loader`], where the loader also finds the extension's validation layer, [`LAYER`], and layers find a file
+/// of settings if one is given.
+///
+/// # Panics
+/// As [`through_the_loader`].
+pub fn with_the_layer(case: &Case, settings: Option<&str>, inside: impl FnOnce()) {
+    let add = |command: &mut Command, folder: &Path| {
+        layer_manifest(folder);
+        command.env("VK_ADD_LAYER_PATH", folder);
+        if let Some(settings) = settings {
+            let path = folder.join("vk_layer_settings.txt");
+            std::fs::write(&path, settings).expect("the settings are written");
+            command
+                .env("VK_LAYER_SETTINGS_PATH", path)
+                .env_remove("VK_LAYER_CUSTOM_STYPE_LIST");
+        }
+    };
+    loaded(case, add, inside);
+}
+
+fn loaded(case: &Case, add: impl FnOnce(&mut Command, &Path), inside: impl FnOnce()) {
     if case.is_alone() {
         return inside();
     }
@@ -45,8 +82,8 @@ pub fn through_the_loader_with(case: &Case, variables: &[(&str, &str)], inside: 
             .env("VK_DRIVER_FILES", &manifest)
             .env("VK_ICD_FILENAMES", &manifest)
             .env("VK_LAYER_CUSTOM_STYPE_LIST", unregistered_structures())
-            .env_remove("VK_INSTANCE_LAYERS")
-            .envs(variables.iter().copied());
+            .env_remove("VK_INSTANCE_LAYERS");
+        add(command, folder.path());
     });
 }
 

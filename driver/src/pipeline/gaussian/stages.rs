@@ -307,6 +307,9 @@ fn components(
         if is_key && location == GAUSSIAN_LOCATION_UNUSED_GAURAST {
             continue;
         }
+        if location == GAUSSIAN_LOCATION_UNUSED_GAURAST {
+            return refuse(format!("{name} is unused, but the pipeline reads it"));
+        }
         if components.iter().any(|&(taken, _)| taken == location) {
             return refuse(format!(
                 "{name} is location {location}, as another output is"

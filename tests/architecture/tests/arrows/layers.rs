@@ -10,6 +10,7 @@ const RUNNER: &str = "tests/runner";
 
 /// The folders on which packages of a folder may depend. Folders match by prefix, and the first matching row counts.
 const LAYERS: &[(&str, &[&str])] = &[
+    ("api/layer", &["api/gaurast"]),
     ("api", &["api"]),
     ("simdevice/devmem", &[]),
     ("simdevice/isa", &["simdevice/devmem"]),
@@ -75,6 +76,8 @@ fn wrong_arrows_are_found() {
     };
     for (from, to, is_dev, expected) in [
         ("api/gaurast", "driver", false, false),
+        ("api/layer", "driver", false, false),
+        ("api/layer", "api/gaurast", false, true),
         ("api/render", "driver", true, true),
         ("simdevice", "driver", false, false),
         ("driver", "tests/runner", false, false),

@@ -1,0 +1,148 @@
+//! Devices: the next layer's commands, what is known, and how the application is told.
+
+use std::collections::{BTreeMap, HashMap, HashSet};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
+
+use ash::vk;
+
+use crate::facts::Facts;
+use crate::instance::Instance;
+use crate::interface;
+use crate::next::Next;
+use crate::objects::Objects;
+use crate::recording::Recording;
+use crate::report::Faults;
+
+/// How often one message is given on a device.
+const REPEATS: u32 = 32;
+
+/// What changes.
+#[derive(Default)]
+pub(crate) struct State {
+    pub(crate) objects: Objects,
+    pub(crate) recordings: HashMap<vk::CommandBuffer, Recording>,
+    /// Draws whose contents were looked at, by what they read: applications record the same draw for each frame.
+    pub(crate) checked: HashSet<u64>,
+}
+
+impl State {
+    /// The recording of a command buffer, and the objects.
+    pub(crate) fn recording(
+        &mut self,
+        commands: vk::CommandBuffer,
+    ) -> (&mut Recording, &mut Objects) {
+        (
+            self.recordings.entry(commands).or_default(),
+            &mut self.objects,
+        )
+    }
+}
+
+/// A device.
+pub(crate) struct Device {
+    pub(crate) handle: vk::Device,
+    pub(crate) physical_device: vk::PhysicalDevice,
+    pub(crate) get_device_proc_addr: vk::PFN_vkGetDeviceProcAddr,
+    pub(crate) next: Next,
+    pub(crate) instance: Arc<Instance>,
+    pub(crate) facts: Facts,
+    state: Mutex<State>,
+    told: Mutex<HashMap<&'static str, u32>>,
+}
+
+/// The devices that live, by the loader's key.
+static DEVICES: RwLock<BTreeMap<usize, Arc<Device>>> = RwLock::new(BTreeMap::new());
+
+impl Device {
+    /// Makes what the layer knows of a device.
+    pub(crate) fn new(
+        (handle, physical_device): (vk::Device, vk::PhysicalDevice),
+        get_device_proc_addr: vk::PFN_vkGetDeviceProcAddr,
+        instance: Arc<Instance>,
+        facts: Facts,
+    ) -> Self {
+        // SAFETY: the next layer gives its own commands by name.
+        let next = unsafe { Next::load(|name| get_device_proc_addr(handle, name.as_ptr())) };
+        Self {
+            handle,
+            physical_device,
+            get_device_proc_addr,
+            next,
+            instance,
+            facts,
+            state: Mutex::default(),
+            told: Mutex::default(),
+        }
+    }
+
+    /// Remembers a device.
+    pub(crate) fn register(self) {
+        // SAFETY: the next layer has just made it.
+        let key = unsafe { interface::key(self.handle) };
+        let mut devices = DEVICES.write().unwrap_or_else(PoisonError::into_inner);
+        devices.insert(key, Arc::new(self));
+    }
+
+    /// The device of a handle of its own, of a queue or of a command buffer.
+    ///
+    /// # Safety
+    /// The handle is valid.
+    pub(crate) unsafe fn of<H: vk::Handle>(handle: H) -> Option<Arc<Self>> {
+        // SAFETY: the caller's promise.
+        let key = unsafe { interface::key(handle) };
+        let devices = DEVICES.read().unwrap_or_else(PoisonError::into_inner);
+        devices.get(&key).cloned()
+    }
+
+    /// Forgets a device, and gives it a last time.
+    ///
+    /// # Safety
+    /// The handle is valid.
+    pub(crate) unsafe fn forget(handle: vk::Device) -> Option<Arc<Self>> {
+        // SAFETY: the caller's promise.
+        let key = unsafe { interface::key(handle) };
+        let mut devices = DEVICES.write().unwrap_or_else(PoisonError::into_inner);
+        devices.remove(&key)
+    }
+
+    /// What changes, locked.
+    pub(crate) fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Looks at a command, and tells what is wrong with it. A panic goes no further: the command is passed on unchecked.
+    pub(crate) fn observe(&self, look: impl FnOnce(&mut State, &mut Faults)) {
+        let mut faults = Faults::default();
+        let looked = {
+            let mut state = self.lock();
+            catch_unwind(AssertUnwindSafe(|| look(&mut state, &mut faults)))
+        };
+        if looked.is_err() {
+            eprintln!(
+                "VK_LAYER_GAURAST_validation: a defect of the layer; a command goes unchecked"
+            );
+        }
+        self.tell(&faults);
+    }
+
+    /// Tells the application, while nothing is locked.
+    pub(crate) fn tell(&self, faults: &Faults) {
+        for fault in &faults.0 {
+            let times = {
+                let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
+                let times = told.entry(fault.id).or_default();
+                *times += 1;
+                *times
+            };
+            if times > REPEATS {
+                continue;
+            }
+            let mut fault = fault.clone();
+            if times == REPEATS {
+                fault.text += " (further messages of this kind are left out)";
+            }
+            self.instance.messengers.tell(&fault);
+        }
+    }
+}

@@ -1,0 +1,77 @@
+//! What a device is: its features that are enabled, its limits, and copies of the extension's structures.
+
+use ash::vk;
+use gaurast::vk as gvk;
+
+/// A copy of a structure whose chain is cut off.
+#[derive(Clone, Copy)]
+pub(crate) struct Plain<T>(T);
+
+// SAFETY: `Plain` is made of structures whose only pointer, `pNext`, was set to null.
+unsafe impl<T> Send for Plain<T> {}
+// SAFETY: as above.
+unsafe impl<T> Sync for Plain<T> {}
+
+impl<T> std::ops::Deref for Plain<T> {
+    type Target = T;
+
+    fn deref(&self) -> &T {
+        &self.0
+    }
+}
+
+impl<T> std::ops::DerefMut for Plain<T> {
+    fn deref_mut(&mut self) -> &mut T {
+        &mut self.0
+    }
+}
+
+macro_rules! plain {
+    ($($structure:ident),*) => {$(
+        impl Plain<gvk::$structure<'static>> {
+            /// A copy without the chain.
+            pub(crate) fn of(structure: &gvk::$structure<'_>) -> Self {
+                let mut copy = gvk::$structure::default();
+                let chain = copy.p_next;
+                // SAFETY: both are the same structure but for the lifetime of the chain, which is cut off next.
+                copy = unsafe { std::mem::transmute_copy(structure) };
+                copy.p_next = chain;
+                Self(copy)
+            }
+        }
+    )*};
+}
+plain!(
+    PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST,
+    PipelineGaussianStateCreateInfoGAURAST,
+    GaussianCameraGAURAST,
+    GaussianSphericalHarmonicsBufferGAURAST
+);
+
+/// The features of the extension that are enabled.
+pub(crate) type Features =
+    Plain<gvk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'static>>;
+/// The Gaussian state of a pipeline.
+pub(crate) type GaussianState = Plain<gvk::PipelineGaussianStateCreateInfoGAURAST<'static>>;
+/// A camera.
+pub(crate) type Camera = Plain<gvk::GaussianCameraGAURAST<'static>>;
+/// Harmonics in a buffer.
+pub(crate) type Harmonics = Plain<gvk::GaussianSphericalHarmonicsBufferGAURAST<'static>>;
+
+/// What a device has and allows.
+pub(crate) struct Facts {
+    /// The extension is enabled.
+    pub(crate) has_extension: bool,
+    /// Its features that are enabled.
+    pub(crate) features: Features,
+    /// `maxSphericalHarmonicsDegree`.
+    pub(crate) max_degree: u32,
+    /// `gaussianSampleCounts`.
+    pub(crate) sample_counts: vk::SampleCountFlags,
+    /// `maxGaussiansPerDraw`.
+    pub(crate) max_gaussians_per_draw: u64,
+    /// `maxMultiviewViewCount`.
+    pub(crate) max_views: u32,
+    /// The memory types that the host may map, a bit each.
+    pub(crate) mappable: u32,
+}

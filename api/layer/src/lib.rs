@@ -1,0 +1,126 @@
+//! `VK_LAYER_GAURAST_validation`: a Vulkan layer that checks the use of `VK_GAURAST_gaussian_primitive_topology`, on any driver.
+//!
+//! It says which rule of the extension's valid usage a command breaks, and warns of what is valid and surely not meant, such
+//! as logarithms where scales are wanted. Messages go to the application's debug-utils messengers, or to the standard error
+//! where there is none. Every command is passed on as it is.
+//!
+//! | module | has |
+//! |---|---|
+//! | `interface` | the loader's structures |
+//! | `hooks` | the commands that are intercepted |
+//! | `next` | the next layer's commands |
+//! | `instance`, `device` | what lives, by the loader's key |
+//! | `objects`, `recording`, `request` | what the layer knows: objects, command buffers, a pipeline that is created |
+//! | `rules` | what is checked |
+//! | `spirv`, `formats` | a shader's interface; how vertex formats are read |
+//! | `report` | messages |
+
+#![allow(non_snake_case, reason = "a layer's library is named as the layer")]
+
+mod device;
+mod facts;
+mod formats;
+mod hooks;
+mod instance;
+mod interface;
+mod next;
+mod objects;
+mod recording;
+mod report;
+mod request;
+mod rules;
+mod spirv;
+
+use std::ffi::{CStr, c_char};
+use std::mem::transmute;
+
+use ash::vk;
+
+use crate::device::Device;
+use crate::instance::Instance;
+use crate::interface::NegotiateLayerInterface;
+use crate::next::Function;
+
+/// Agrees with the loader on the version of their interface, and gives it the layer's functions.
+///
+/// # Safety
+/// `version` points at the loader's structure, or is null.
+#[unsafe(no_mangle)]
+pub unsafe extern "system" fn vkNegotiateLoaderLayerInterfaceVersion(
+    version: *mut NegotiateLayerInterface,
+) -> vk::Result {
+    // SAFETY: the caller's promise.
+    let Some(version) = (unsafe { version.as_mut() }) else {
+        return vk::Result::ERROR_INITIALIZATION_FAILED;
+    };
+    if version.version < interface::VERSION {
+        return vk::Result::ERROR_INITIALIZATION_FAILED;
+    }
+    version.version = interface::VERSION;
+    version.get_instance_proc_addr = Some(get_instance_proc_addr);
+    version.get_device_proc_addr = Some(get_device_proc_addr);
+    version.get_physical_device_proc_addr = Some(get_physical_device_proc_addr);
+    vk::Result::SUCCESS
+}
+
+/// `vkGetInstanceProcAddr`.
+unsafe extern "system" fn get_instance_proc_addr(
+    instance: vk::Instance,
+    name: *const c_char,
+) -> vk::PFN_vkVoidFunction {
+    // SAFETY: the name is a string, or null.
+    let command = unsafe { interface::string(name) };
+    let get: vk::PFN_vkGetInstanceProcAddr = get_instance_proc_addr;
+    if command == c"vkGetInstanceProcAddr" {
+        // SAFETY: function pointers have one size, and whoever calls it casts it back.
+        return unsafe { transmute::<vk::PFN_vkGetInstanceProcAddr, vk::PFN_vkVoidFunction>(get) };
+    }
+    if instance == vk::Instance::null() {
+        return hooks::instance_hook(command)
+            .map(plain)
+            .filter(|_| command == c"vkCreateInstance");
+    }
+    // SAFETY: the instance is valid.
+    let own = unsafe { Instance::of(instance) }?;
+    let next = own.next_by_name(command)?;
+    let get_device: vk::PFN_vkGetDeviceProcAddr = get_device_proc_addr;
+    if command == c"vkGetDeviceProcAddr" {
+        // SAFETY: as above.
+        return unsafe {
+            transmute::<vk::PFN_vkGetDeviceProcAddr, vk::PFN_vkVoidFunction>(get_device)
+        };
+    }
+    let hook = hooks::instance_hook(command).or_else(|| hooks::device_hook(command));
+    Some(hook.map_or(next, plain))
+}
+
+/// `vkGetDeviceProcAddr`.
+unsafe extern "system" fn get_device_proc_addr(
+    device: vk::Device,
+    name: *const c_char,
+) -> vk::PFN_vkVoidFunction {
+    // SAFETY: the name is a string, or null.
+    let command = unsafe { interface::string(name) };
+    let get: vk::PFN_vkGetDeviceProcAddr = get_device_proc_addr;
+    if command == c"vkGetDeviceProcAddr" {
+        // SAFETY: function pointers have one size, and whoever calls it casts it back.
+        return unsafe { transmute::<vk::PFN_vkGetDeviceProcAddr, vk::PFN_vkVoidFunction>(get) };
+    }
+    // SAFETY: the device is valid, and the name is a string.
+    let next = unsafe { (Device::of(device)?.get_device_proc_addr)(device, name) }?;
+    Some(hooks::device_hook(command).map_or(next, plain))
+}
+
+/// `vk_layerGetPhysicalDeviceProcAddr`.
+unsafe extern "system" fn get_physical_device_proc_addr(
+    instance: vk::Instance,
+    name: *const c_char,
+) -> vk::PFN_vkVoidFunction {
+    // SAFETY: the instance is valid, and the name is a string.
+    unsafe { Instance::of(instance)?.next_of_physical_device(CStr::from_ptr(name)) }
+}
+
+/// A function without a type, as ash has it.
+fn plain(function: Function) -> unsafe extern "system" fn() {
+    function
+}

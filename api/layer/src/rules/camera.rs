@@ -1,0 +1,161 @@
+//! Cameras.
+
+use ash::vk::TaggedStructure;
+use gaurast::vk::{GaussianCameraGAURAST, GaussianCameraModelGAURAST as Model};
+
+use crate::facts::{Camera, Facts};
+use crate::report::Faults;
+
+/// Checks the cameras of `vkCmdSetGaussianCamerasGAURAST`; gives those that are right.
+pub(crate) fn check_command(
+    cameras: &[GaussianCameraGAURAST<'_>],
+    count: u32,
+    facts: &Facts,
+    faults: &mut Faults,
+) -> Option<Vec<Camera>> {
+    let before = faults.0.len();
+    faults.require(
+        count >= 1 && count <= facts.max_views,
+        "VUID-vkCmdSetGaussianCamerasGAURAST-cameraCount-90062",
+        || {
+            format!(
+                "cameraCount is {count}, but must be at least 1 and at most maxMultiviewViewCount ({})",
+                facts.max_views
+            )
+        },
+    );
+    for (index, camera) in cameras.iter().enumerate() {
+        let name = format!("pCameras[{index}]");
+        if camera.s_type == GaussianCameraGAURAST::STRUCTURE_TYPE {
+            check(camera, &name, facts, faults);
+        } else {
+            faults.error(
+                "VUID-VkGaussianCameraGAURAST-sType-sType",
+                format!(
+                    "{name}.sType is {}, but must be VK_STRUCTURE_TYPE_GAUSSIAN_CAMERA_GAURAST ({})",
+                    camera.s_type.as_raw(),
+                    GaussianCameraGAURAST::STRUCTURE_TYPE.as_raw()
+                ),
+            );
+        }
+    }
+    let is_right = faults.0[before..].iter().all(|fault| !fault.is_error);
+    (is_right && !cameras.is_empty()).then(|| cameras.iter().map(Camera::of).collect())
+}
+
+/// Checks a camera's values.
+pub(crate) fn check(
+    camera: &GaussianCameraGAURAST<'_>,
+    name: &str,
+    facts: &Facts,
+    faults: &mut Faults,
+) {
+    let c = camera;
+    check_model(c.model, name, facts, faults);
+    let finite = |values: &[f32]| values.iter().all(|value| value.is_finite());
+    faults.require(
+        finite(&c.rotation),
+        "VUID-VkGaussianCameraGAURAST-rotation-90064",
+        || format!("{name}.rotation is {:?}, but must be finite", c.rotation),
+    );
+    let eye_is_finite = c.eye.iter().all(|value| value.is_finite());
+    faults.require(
+        eye_is_finite,
+        "VUID-VkGaussianCameraGAURAST-eye-90065",
+        || format!("{name}.eye is {:?}, but must be finite", c.eye),
+    );
+    faults.require(
+        finite(&c.principal_point),
+        "VUID-VkGaussianCameraGAURAST-principalPoint-90066",
+        || {
+            format!(
+                "{name}.principalPoint is {:?}, but must be finite",
+                c.principal_point
+            )
+        },
+    );
+    faults.require(
+        finite(&c.depth_coefficients),
+        "VUID-VkGaussianCameraGAURAST-depthCoefficients-90067",
+        || {
+            format!(
+                "{name}.depthCoefficients is {:?}, but must be finite",
+                c.depth_coefficients
+            )
+        },
+    );
+    faults.require(
+        finite(&c.focal_length) && c.focal_length.iter().all(|&f| f > 0.0),
+        "VUID-VkGaussianCameraGAURAST-focalLength-90068",
+        || {
+            format!(
+                "{name}.focalLength is {:?}, but must be finite and greater than 0",
+                c.focal_length
+            )
+        },
+    );
+    let near_is_right =
+        c.near_plane.is_finite() && (c.near_plane > 0.0 || c.model == Model::ORTHOGRAPHIC);
+    faults.require(near_is_right, "VUID-VkGaussianCameraGAURAST-nearPlane-90069", || {
+        format!(
+            "{name}.nearPlane is {}, but must be finite, and greater than 0 unless the camera is orthographic",
+            c.near_plane
+        )
+    });
+    faults.require(
+        !near_is_right || c.far_plane > c.near_plane,
+        "VUID-VkGaussianCameraGAURAST-farPlane-90070",
+        || {
+            format!(
+                "{name}.farPlane is {}, but must be greater than nearPlane ({})",
+                c.far_plane, c.near_plane
+            )
+        },
+    );
+    if finite(&c.rotation) {
+        check_rotation(&c.rotation, name, faults);
+    }
+}
+
+fn check_model(model: Model, name: &str, facts: &Facts, faults: &mut Faults) {
+    let features = &facts.features;
+    let feature = match model {
+        Model::PINHOLE => return,
+        Model::ORTHOGRAPHIC => ("orthographicCamera", features.orthographic_camera),
+        Model::FISHEYE => ("fisheyeCamera", features.fisheye_camera),
+        Model::EQUIRECTANGULAR => ("equirectangularCamera", features.equirectangular_camera),
+        other => {
+            return faults.error(
+                "VUID-VkGaussianCameraGAURAST-model-parameter",
+                format!(
+                    "{name}.model is {}, which is no VkGaussianCameraModelGAURAST",
+                    other.as_raw()
+                ),
+            );
+        }
+    };
+    let (feature, is_on) = feature;
+    faults.require(
+        is_on != 0,
+        "VUID-VkGaussianCameraGAURAST-model-parameter",
+        || format!("{name}.model is {model:?}, but the feature {feature} is not enabled"),
+    );
+}
+
+/// Warns of a matrix that is no rotation, and no mirrored one.
+fn check_rotation(rotation: &[f32; 9], name: &str, faults: &mut Faults) {
+    let row = |row: usize| &rotation[3 * row..3 * row + 3];
+    let dot = |a: usize, b: usize| -> f32 { row(a).iter().zip(row(b)).map(|(a, b)| a * b).sum() };
+    let pairs = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
+    let off = pairs.map(|(a, b)| (dot(a, b) - f32::from(u8::from(a == b))).abs());
+    let worst = off.into_iter().fold(0.0, f32::max);
+    if worst > 1e-2 {
+        faults.warning(
+            "GAURAST-Camera-rotation",
+            format!(
+                "{name}.rotation is {rotation:?}, which is not orthonormal (R Rᵀ is off by {worst}): its rows are the directions \
+                 right, down and forward of the picture in world space, without a scale or a projection"
+            ),
+        );
+    }
+}

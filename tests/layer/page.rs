@@ -1,0 +1,63 @@
+//! The page of mistakes, `docs/mistakes.md`.
+
+use std::path::Path;
+
+use gaurast_testkit::Message;
+
+/// A row: chapter, mistake, and what the driver and the layer say.
+type Row = (&'static str, &'static str, Option<Message>, Message);
+
+/// Set to 1, it has the page written; else it is compared.
+const WRITE: &str = "GAURAST_WRITE_MISTAKES";
+
+const HEAD: &str = "# Mistakes\n\n\
+    What this driver and the layer [`VK_LAYER_GAURAST_validation`](layer.md) say of mistakes. The layer's ids that begin with\n\
+    `GAURAST` are of what is valid and surely not meant; so is most of what the driver says nothing of. Each row is made by\n\
+    `tests/layer`, which compares the page; `GAURAST_WRITE_MISTAKES=1` has it written.\n";
+
+fn cell(text: &str) -> String {
+    text.replace('|', "\\|").replace('\n', " ")
+}
+
+fn page(rows: &[Row]) -> String {
+    let mut page = HEAD.to_owned();
+    let mut current = "";
+    for (chapter, name, driver, layer) in rows {
+        if *chapter != current {
+            current = chapter;
+            page += &format!(
+                "\n## {chapter}\n\n| mistake | the driver says | the layer says |\n|---|---|---|\n"
+            );
+        }
+        let driver = driver
+            .as_ref()
+            .map_or("nothing".to_owned(), |message| cell(&message.text));
+        page += &format!(
+            "| {} | {driver} | `{}`: {} |\n",
+            cell(name),
+            layer.id,
+            cell(&layer.text)
+        );
+    }
+    page
+}
+
+/// Compares the page with what was said, or writes it.
+pub fn check(rows: &[Row]) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/mistakes.md");
+    let page = page(rows);
+    if std::env::var_os(WRITE).is_some_and(|value| value == "1") {
+        std::fs::write(path, page).expect("the page is written");
+        return;
+    }
+    let stored = std::fs::read_to_string(path).expect("docs/mistakes.md");
+    let mut lines = page
+        .lines()
+        .zip(stored.lines())
+        .filter(|(now, then)| now != then);
+    let first = lines.next();
+    assert!(
+        page == stored,
+        "{WRITE}=1 writes docs/mistakes.md anew; first difference: {first:#?}"
+    );
+}

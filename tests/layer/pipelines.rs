@@ -1,0 +1,327 @@
+//! Mistakes in the creation of pipelines, with all features enabled.
+
+use ash::vk;
+use gaurast::vk::{
+    GaussianAntialiasingGAURAST, GaussianCameraSourceGAURAST, GaussianGeometryGAURAST,
+    GaussianLinearizationGAURAST, GaussianOrderGAURAST, GaussianPrecisionGAURAST,
+    GaussianProjectionModeGAURAST, PipelineGaussianApproximationStateCreateInfoGAURAST,
+    PipelineGaussianStateCreateFlagsGAURAST,
+};
+use gaurast_testkit::{Bindings, Buffer, Graphics, Resource, Shader, blend};
+
+use crate::stage::{
+    Mistake, State, creation, instanced, mistake, pipeline, shaded, shaders, spirv, splats, with,
+};
+
+pub fn allowing(exponential_error: f32, contribution_budget: f32) -> Graphics<'static> {
+    let approximation = PipelineGaussianApproximationStateCreateInfoGAURAST::default()
+        .exponential_error(exponential_error)
+        .contribution_budget(contribution_budget);
+    Graphics {
+        approximation: Some(approximation),
+        ..splats()
+    }
+}
+
+fn raster(change: impl Fn(Raster) -> Raster + 'static) -> impl Fn() -> Graphics<'static> + 'static {
+    move || {
+        let request = splats();
+        Graphics {
+            raster: change(request.raster),
+            ..request
+        }
+    }
+}
+type Raster = vk::PipelineRasterizationStateCreateInfo<'static>;
+
+fn counted(count: u32) -> impl Fn(&crate::stage::Stage) -> Vec<gaurast_testkit::Message> {
+    move |stage| {
+        let buffer = Buffer::new(&stage.full, 1024);
+        let set = Bindings::new(&stage.full, &[Resource::Uniform(buffer.raw)]);
+        let source = GaussianCameraSourceGAURAST::UNIFORM_BUFFER;
+        let request = Graphics {
+            view_mask: 0b101,
+            set_layouts: vec![set.layout],
+            ..with(|s| s.camera_source(source).camera_count(count))
+        };
+        creation(&stage.full, &request)
+    }
+}
+
+pub fn mistakes() -> Vec<Mistake> {
+    let mut all = structures();
+    all.extend(numbers());
+    all.extend(combinations());
+    all.extend(fixed_functions());
+    all.extend(output());
+    all
+}
+
+fn structures() -> Vec<Mistake> {
+    let stages = "VUID-VkGraphicsPipelineCreateInfo-projectionMode-90008";
+    let parameter = "VUID-VkPipelineGaussianStateCreateInfoGAURAST-parameter";
+    vec![
+        mistake(
+            "a pipeline on a device on which the topology is not enabled",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianPrimitiveTopology-90032",
+            |stage| creation(&stage.without, &splats()),
+        ),
+        pipeline(
+            "the topology without a Gaussian state",
+            "VUID-VkGraphicsPipelineCreateInfo-topology-90007",
+            || Graphics {
+                gaussian: None,
+                ..splats()
+            },
+        ),
+        pipeline(
+            "a Gaussian state beside a list of triangles",
+            "GAURAST-Pipeline-topology",
+            || Graphics {
+                topology: vk::PrimitiveTopology::TRIANGLE_LIST,
+                ..splats()
+            },
+        ),
+        pipeline(
+            "primitive restart",
+            "VUID-VkPipelineInputAssemblyStateCreateInfo-topology-90009",
+            || Graphics {
+                restart: true,
+                ..splats()
+            },
+        ),
+        shaders(
+            "a vertex stage with fixed-function projection",
+            stages,
+            || splats().with_shader(Shader::vertex(spirv!("gaussian.vert"))),
+        ),
+        pipeline(
+            "vertex-shader projection without a vertex stage",
+            stages,
+            || with(|s| s.projection_mode(GaussianProjectionModeGAURAST::VERTEX_SHADER)),
+        ),
+        shaders("a geometry stage", stages, || {
+            let stage = vk::ShaderStageFlags::GEOMETRY;
+            splats().with_shader(Shader::new(stage, spirv!("gaussian.vert")))
+        }),
+        pipeline("an order that is none", parameter, || {
+            with(|s| s.order(GaussianOrderGAURAST::from_raw(77)))
+        }),
+        pipeline("a geometry that is none", parameter, || {
+            with(|s| s.geometry(GaussianGeometryGAURAST::from_raw(-1)))
+        }),
+        pipeline("a flag that is none", parameter, || {
+            with(|s| s.flags(PipelineGaussianStateCreateFlagsGAURAST::from_raw(0x100)))
+        }),
+    ]
+}
+
+fn numbers() -> Vec<Mistake> {
+    let ceiling = "VUID-VkPipelineGaussianStateCreateInfoGAURAST-alphaCeiling-90013";
+    let state = |name, id, change: fn(State) -> State| pipeline(name, id, move || with(change));
+    vec![
+        state(
+            "a degree of harmonics that the device does not have",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-sphericalHarmonicsDegree-90010",
+            |s| s.spherical_harmonics_degree(9),
+        ),
+        state(
+            "a negative low-pass variance",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-lowPassVariance-90011",
+            |s| s.low_pass_variance(-0.3),
+        ),
+        state(
+            "an alpha floor of 1 in 255ths",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-alphaFloor-90012",
+            |s| s.alpha_floor(255.0),
+        ),
+        state("an alpha ceiling of 0", ceiling, |s| s.alpha_ceiling(0.0)),
+        state("an alpha ceiling below the floor", ceiling, |s| {
+            s.alpha_floor(0.5).alpha_ceiling(0.25)
+        }),
+        state(
+            "a transmittance floor of 1",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-transmittanceFloor-90014",
+            |s| s.transmittance_floor(1.0),
+        ),
+        pipeline(
+            "a negative error of the exponential",
+            "VUID-VkPipelineGaussianApproximationStateCreateInfoGAURAST-exponentialError-90051",
+            || allowing(-0.1, 0.0),
+        ),
+        pipeline(
+            "a budget of contributions that is NaN",
+            "VUID-VkPipelineGaussianApproximationStateCreateInfoGAURAST-contributionBudget-90052",
+            || allowing(0.0, f32::NAN),
+        ),
+        state(
+            "an alpha ceiling of 1 with a transmittance floor",
+            "GAURAST-Pipeline-alpha-ceiling",
+            |s| s.alpha_ceiling(1.0),
+        ),
+    ]
+}
+
+fn combinations() -> Vec<Mistake> {
+    let (flat, half) = (
+        GaussianGeometryGAURAST::GAUSSIAN_2D,
+        GaussianPrecisionGAURAST::FLOAT16,
+    );
+    let precision = "VUID-VkPipelineGaussianStateCreateInfoGAURAST-precision-90030";
+    let matrix = "VUID-VkPipelineGaussianStateCreateInfoGAURAST-firstModelMatrix-90028";
+    let binding = "VUID-VkPipelineGaussianStateCreateInfoGAURAST-cameraBinding-90025";
+    let count = "VUID-VkPipelineGaussianStateCreateInfoGAURAST-cameraCount-90026";
+    let changed = |change: fn(State) -> State| {
+        move || {
+            let request = instanced();
+            Graphics {
+                gaussian: request.gaussian.map(change),
+                ..request
+            }
+        }
+    };
+    vec![
+        pipeline(
+            "2D Gaussians with opacity compensation",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-geometry-90027",
+            move || {
+                let compensated = GaussianAntialiasingGAURAST::OPACITY_COMPENSATED;
+                with(|s| s.geometry(flat).antialiasing(compensated))
+            },
+        ),
+        pipeline(
+            "model matrices in the order of each pixel",
+            matrix,
+            changed(|s| s.order(GaussianOrderGAURAST::PER_PIXEL)),
+        ),
+        pipeline(
+            "model matrices of 2D Gaussians",
+            matrix,
+            changed(|s| s.geometry(GaussianGeometryGAURAST::GAUSSIAN_2D)),
+        ),
+        pipeline(
+            "the unscented transform of 2D Gaussians",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-geometry-90029",
+            move || {
+                let unscented = GaussianLinearizationGAURAST::UNSCENTED;
+                with(|s| s.geometry(flat).linearization(unscented))
+            },
+        ),
+        pipeline(
+            "binary16 in the order of each pixel",
+            precision,
+            move || with(|s| s.precision(half).order(GaussianOrderGAURAST::PER_PIXEL)),
+        ),
+        pipeline("binary16 of 2D Gaussians", precision, move || {
+            with(|s| s.precision(half).geometry(flat))
+        }),
+        shaders("binary16 of what a shader projects", precision, move || {
+            shaded(|s| s.precision(half))
+        }),
+        pipeline(
+            "a camera in a uniform buffer that the layout does not have",
+            binding,
+            || with(|s| s.camera_source(GaussianCameraSourceGAURAST::UNIFORM_BUFFER)),
+        ),
+        mistake("a camera in a storage buffer", binding, |stage| {
+            let buffer = Buffer::new(&stage.full, 1024);
+            let set = Bindings::new(&stage.full, &[Resource::Storage(buffer.raw)]);
+            let source = GaussianCameraSourceGAURAST::UNIFORM_BUFFER;
+            let request = Graphics {
+                set_layouts: vec![set.layout],
+                ..with(|s| s.camera_source(source))
+            };
+            creation(&stage.full, &request)
+        }),
+        mistake("no cameras in a uniform buffer", count, counted(0)),
+        mistake(
+            "fewer cameras in a uniform buffer than views",
+            count,
+            counted(2),
+        ),
+    ]
+}
+
+fn fixed_functions() -> Vec<Mistake> {
+    vec![
+        pipeline(
+            "culling of back faces",
+            "GAURAST-Pipeline-cull-mode",
+            raster(|raster| raster.cull_mode(vk::CullModeFlags::BACK)),
+        ),
+        pipeline(
+            "a polygon mode of lines",
+            "GAURAST-Pipeline-polygon-mode",
+            raster(|raster| raster.polygon_mode(vk::PolygonMode::LINE)),
+        ),
+        pipeline(
+            "rasterizer discard",
+            "GAURAST-Pipeline-rasterizer-discard",
+            raster(|raster| raster.rasterizer_discard_enable(true)),
+        ),
+        pipeline(
+            "dynamic rasterizer discard",
+            "GAURAST-Pipeline-dynamic-state",
+            || splats().with_dynamic(vk::DynamicState::RASTERIZER_DISCARD_ENABLE),
+        ),
+        pipeline("two viewports", "GAURAST-Pipeline-viewport-count", || {
+            Graphics {
+                viewports: 2,
+                ..splats()
+            }
+        }),
+        pipeline(
+            "a vertex binding whose stride is 0",
+            "GAURAST-Pipeline-stride",
+            || {
+                let mut request = splats();
+                request.bindings[0].stride = 0;
+                request
+            },
+        ),
+        pipeline(
+            "a vertex binding whose stride is counted in floats",
+            "GAURAST-Pipeline-stride",
+            || {
+                let mut request = splats();
+                request.bindings[0].stride = 14;
+                request
+            },
+        ),
+    ]
+}
+
+fn output() -> Vec<Mistake> {
+    use vk::BlendFactor as Factor;
+    vec![
+        pipeline(
+            "blending that multiplies by alpha once more",
+            "GAURAST-Pipeline-blending",
+            || Graphics {
+                blend: vec![blend(
+                    Factor::SRC_ALPHA,
+                    Factor::ONE_MINUS_SRC_ALPHA,
+                    vk::BlendOp::ADD,
+                )],
+                ..splats()
+            },
+        ),
+        pipeline(
+            "a write mask of nothing",
+            "GAURAST-Pipeline-write-mask",
+            || Graphics {
+                blend: vec![vk::PipelineColorBlendAttachmentState::default()],
+                ..splats()
+            },
+        ),
+        pipeline(
+            "an integer colour attachment",
+            "GAURAST-Pipeline-integer-attachment",
+            || Graphics {
+                formats: vec![vk::Format::R32G32B32A32_UINT],
+                blend: vec![gaurast_testkit::opaque()],
+                ..splats()
+            },
+        ),
+    ]
+}
