@@ -13,7 +13,7 @@ use crate::shader_module::ShaderStage;
 use ash::vk;
 use gaurast::vk::{
     GAUSSIAN_LOCATION_UNUSED_GAURAST, PipelineGaussianApproximationStateCreateInfoGAURAST,
-    PipelineGaussianStateCreateInfoGAURAST,
+    PipelineGaussianFootprintStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 use simdevice::Format;
 use simdevice::state::gaussian::GaussianState;

@@ -27,6 +27,7 @@ pub(crate) fn distance(draw: &Draw, shown: Shown, picture: &Picture) -> Result<f
         depth_coefficients: draw.camera.depth_coefficients,
         depth_range: [viewport.min_depth, viewport.max_depth],
         format: OracleDepthFormat::Float,
+        negative_one_to_one: false,
         depth: None,
         bounds: None,
         stencil: None,

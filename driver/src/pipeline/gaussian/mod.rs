@@ -326,6 +326,7 @@ fn state(
         footprint: GaussianFootprint::default(),
         sample_mask: fragments.sample_mask,
         depth_stencil: fragments.depth_stencil,
+        negative_one_to_one: fragments.negative_one_to_one,
         logic_op: fragments.logic_op,
         blend: fragments.blend,
         blend_constants: fragments.blend_constants,
