@@ -48,7 +48,18 @@ pub fn layer_manifest(folder: &Path) -> PathBuf {
 /// # Panics
 /// If it fails there.
 pub fn through_the_loader(case: &Case, inside: impl FnOnce()) {
-    loaded(case, |_, _| (), inside);
+    through_the_loader_with(case, &[], inside);
+}
+
+/// As [`through_the_loader`], with further variables in the environment of the process.
+///
+/// # Panics
+/// As [`through_the_loader`].
+pub fn through_the_loader_with(case: &Case, variables: &[(&str, &str)], inside: impl FnOnce()) {
+    let add = |command: &mut Command, _: &Path| {
+        command.envs(variables.iter().copied());
+    };
+    loaded(case, add, inside);
 }
 
 /// As [`through_the_loader`], where the loader also finds the extension's validation layer, [`LAYER`], and layers find a file
