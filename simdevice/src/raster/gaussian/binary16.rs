@@ -10,7 +10,7 @@ use super::block_lists::BlockKernel;
 use super::depth_ranges::DepthRanges;
 use super::grid::{BLOCK_X, BLOCK_Y, LANE_X_64, LANE_Y_64};
 use super::inputs::{FIND_MEDIAN, NO_DEPTH, Thresholds, TileInputs};
-use crate::gaussian::splat::Splat;
+use crate::gaussian::splat::{Splat, SplatLook};
 use crate::simd::exp2::POWER_OF_TWO;
 use crate::simd::{bits_of, floats_of};
 use fearless_simd::{Simd, f32x16, f64x8, mask32x16, prelude::*, u32x16};
@@ -82,9 +82,12 @@ impl BlockKernel for Half {
         let shown = if thresholds.depth_mode <= NO_DEPTH {
             mask32x16::splat(simd, true)
         } else {
-            ranges.pixels(simd, block, splat.depth)
+            ranges.pixels(simd, block, splat.look.depth)
         };
-        let look = (rounded.color, splat.depth);
+        let look = SplatLook {
+            color: rounded.color,
+            depth: splat.look.depth,
+        };
         accumulate(accumulator, simd, block, alpha, shown, look, thresholds)
     }
 }
@@ -121,7 +124,7 @@ fn accumulate<S: Simd>(
     block: usize,
     alpha: f32x16<S>,
     shown: mask32x16<S>,
-    (color, depth): ([f32; 3], u32),
+    SplatLook { color, depth }: SplatLook,
     thresholds: Thresholds,
 ) -> u64 {
     let zero = f32x16::splat(simd, 0.0);
@@ -197,7 +200,10 @@ pub(super) mod scalar {
                 factor: splat.factor.map(|f| round(f as f32)),
                 log2_opacity: round(splat.log2_opacity),
                 // An infinite colour times a weight that underflows would be no number.
-                color: splat.color.map(|c| round(c).clamp(-GREATEST, GREATEST)),
+                color: splat
+                    .look
+                    .color
+                    .map(|c| round(c).clamp(-GREATEST, GREATEST)),
             }
         }
     }

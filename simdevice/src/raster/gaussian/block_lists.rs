@@ -98,7 +98,7 @@ pub(super) fn part<S: Simd>(
     for &primitive in task.list {
         let (batch, place) = locate(primitive);
         let splat = &task.splats[batch][place];
-        let hidden = tests_depth && ranges.hides(splat.depth);
+        let hidden = tests_depth && ranges.hides(splat.look.depth);
         if hidden {
             work.tiles_hidden += 1;
             if !recorded {
@@ -122,7 +122,7 @@ pub(super) fn part<S: Simd>(
             continue;
         }
         if tests_depth {
-            let shown = ranges.blocks(simd, splat.depth);
+            let shown = ranges.blocks(simd, splat.look.depth);
             work.blocks_hidden += u64::from((reached & !shown).to_bitmask().count_ones());
             reached &= shown;
         }

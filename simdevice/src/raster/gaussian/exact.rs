@@ -13,6 +13,7 @@ use super::depth_ranges::DepthRanges;
 use super::grid::{BLOCK_PIXELS, BLOCK_X, BLOCK_Y, LANE_X_64, LANE_Y_64};
 use super::inputs::{FIND_MEAN, FIND_MEDIAN, Kernel, NO_DEPTH, Thresholds, TileInputs};
 use super::pixels::{accumulate, falls_64};
+use crate::gaussian::splat::SplatLook;
 use crate::simd::exp2::exp2_of_negated;
 use fearless_simd::{Simd, f32x16, f64x8, mask64x8, prelude::*};
 
@@ -107,7 +108,7 @@ impl BlockKernel for InOrder {
     ) -> u64 {
         let splat = &task.splats[batch][place];
         let fall = falls(simd, task, (batch, place), block);
-        let look = (splat.color, splat.depth);
+        let look = splat.look;
         accumulate(
             accumulator,
             simd,
@@ -155,7 +156,7 @@ impl BlockKernel for WideSums {
     ) -> u64 {
         let splat = &task.splats[batch][place];
         let fall = falls(simd, task, (batch, place), block);
-        let look = (splat.color, splat.depth);
+        let look = splat.look;
         let to = (block, &mut self.0);
         accumulate_wide(accumulator, simd, to, fall, look, ranges, task.thresholds)
     }
@@ -173,7 +174,7 @@ fn accumulate_wide<S: Simd>(
     simd: S,
     (block, sums): (usize, &mut Sums),
     fall: f32x16<S>,
-    (color, depth): ([f32; 3], u32),
+    SplatLook { color, depth }: SplatLook,
     ranges: &DepthRanges,
     thresholds: Thresholds,
 ) -> u64 {

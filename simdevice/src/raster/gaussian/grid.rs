@@ -16,6 +16,9 @@ pub(super) const BLOCKS: usize = 16;
 pub(super) const ALL_BLOCKS: u64 = (1 << BLOCKS) - 1;
 /// Gaussians of a round: as many as phases pass on through the first-level cache, and a word has bits.
 pub(super) const ROUND: usize = 32;
+/// The places of arrays that are indexed by a Gaussian's number in its round. They are more than [`ROUND`], so that the number
+/// of a word's lowest bit, which is [`ROUND`] for zero, is a place without a check.
+pub(super) const PLACES: usize = ROUND + 8;
 
 /// Half of the distance between a block's first and last pixel centres.
 pub(super) const HALF: f32 = (BLOCK as f32 - 1.0) / 2.0;

@@ -51,8 +51,7 @@ impl<S: Simd> Tally<S> {
             self.bits += u64::from((mask.to_bitmask() & !others.to_bitmask()).count_ones());
         } else {
             // Masks are not combined: that would be calls.
-            let mask = mask.to_vector();
-            self.lanes += (mask & others.to_vector()) - mask;
+            self.lanes -= mask.to_vector() & (others.to_vector() ^ -1);
         }
     }
 

@@ -177,7 +177,7 @@ impl PerPixel {
                 let alpha = exp2_of_negated(simd, fall).min(ceiling);
                 let mut reached = fall.simd_le(task.thresholds.most_fall);
                 if task.thresholds.depth_mode > NO_DEPTH {
-                    reached &= ranges.pixels(simd, block, splat.depth);
+                    reached &= ranges.pixels(simd, block, splat.look.depth);
                 }
                 let mut reached = reached.to_bitmask() as u32 & open;
                 if reached == 0 {
@@ -234,11 +234,11 @@ fn composite_pixel(
         }
         let (batch, place) = locate(names[contribution.place.1 as usize]);
         let splat = &task.splats[batch][place];
-        for (sum, color) in sum.color.iter_mut().zip(splat.color) {
+        for (sum, color) in sum.color.iter_mut().zip(splat.look.color) {
             *sum += weight * f64::from(color);
         }
         if task.thresholds.depth_mode >= FIND_MEDIAN && sum.transmittance >= 0.5 {
-            sum.median = splat.depth;
+            sum.median = splat.look.depth;
         }
         sum.transmittance = rest;
         sum.covered = true;

@@ -9,7 +9,7 @@ use super::inputs::{
 };
 use super::masks::{Tally, only};
 use super::staging::{Reaching, StagedRound};
-use crate::gaussian::splat::Splat;
+use crate::gaussian::splat::{Splat, SplatLook};
 #[cfg(feature = "mistakes")]
 use crate::mistakes::Mistake;
 use crate::simd::bits_of;
@@ -54,7 +54,8 @@ impl Default for Alphas {
 }
 
 impl Alphas {
-    /// Finds the alphas of what is reached; returns how many pixels that is, of those that are not finished.
+    /// Finds the alphas of all Gaussians in the blocks that they may reach. Returns the number of pixels that they reach, of
+    /// those that are not finished, and the number of pairs of a Gaussian and a block.
     ///
     /// They come before any is composited, since they do not depend on each other: several are on their way at a time. A
     /// function of its own, so that its constants have the registers for themselves.
@@ -66,23 +67,25 @@ impl Alphas {
         (round, most_fall): (&StagedRound, &[[f32; BLOCK_PIXELS]; BLOCKS]),
         ranges: &DepthRanges,
         thresholds: Thresholds,
-    ) -> u64 {
+    ) -> (u64, u64) {
         simd.vectorize(
             #[inline(always)]
             || {
                 let ceiling = f32x16::splat(simd, thresholds.alpha_ceiling);
                 let mut pixels = Tally::new(simd);
                 let mut items = &mut self.alphas[..];
+                let mut count_of_all = 0;
                 for (block, &reaching) in reaching.iter().enumerate() {
                     let count = reaching.count_ones() as usize;
                     let Some((alphas, others)) = items.split_at_mut_checked(count) else {
                         break;
                     };
                     items = others;
+                    count_of_all += count as u64;
                     let most_fall = f32x16::from_slice(simd, &most_fall[block]);
                     let mut rest = reaching;
                     for to in alphas {
-                        let number = rest.trailing_zeros() as usize % ROUND;
+                        let number = rest.trailing_zeros() as usize;
                         rest &= rest.wrapping_sub(1);
                         let fall = round.falls(simd, number, block);
                         let at = (block, round.looks[number].depth);
@@ -92,7 +95,7 @@ impl Alphas {
                         alpha.store_slice(to);
                     }
                 }
-                pixels.total()
+                (pixels.total(), count_of_all)
             },
         )
     }
@@ -128,7 +131,18 @@ fn alpha<S: Simd>(
     only(simd, reached, power(simd, mode, fall).min(ceiling))
 }
 
-/// Composites those of `round` that reach a block in it, for each block; returns how many pixels accepted one.
+/// The account of a round's composition.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Evaluated {
+    /// Pairs of a Gaussian and a block whose pixels were evaluated.
+    pub(super) items: u64,
+    /// Pairs of a Gaussian and a pixel that accepted it.
+    pub(super) contributions: u64,
+    /// True if pixels may have been finished.
+    pub(super) may_have_finished: bool,
+}
+
+/// Composites those of `round` that reach a block in it, for each block.
 #[inline(always)]
 pub(super) fn evaluate<S: Simd, const DEPTH: DepthMode>(
     accumulator: &mut Accumulator,
@@ -137,16 +151,20 @@ pub(super) fn evaluate<S: Simd, const DEPTH: DepthMode>(
     (round, alphas): (&StagedRound, &mut Alphas),
     ranges: &DepthRanges,
     thresholds: Thresholds,
-) -> u64 {
+) -> Evaluated {
     let to = (round, &accumulator.most_fall);
-    let reached = alphas.find::<_, DEPTH>(simd, reaching, to, ranges, thresholds);
+    let (reached, items) = alphas.find::<_, DEPTH>(simd, reaching, to, ranges, thresholds);
     let refused =
         composite_all::<_, DEPTH>(accumulator, simd, reaching, (round, alphas), thresholds);
-    reached.saturating_sub(refused)
+    Evaluated {
+        items,
+        contributions: reached.saturating_sub(refused.unwrap_or(0)),
+        may_have_finished: refused.is_some(),
+    }
 }
 
-/// Composites the alphas of a round; returns how many pixels refused one, since they are finished. A function of its own,
-/// as [`Alphas::find`].
+/// Composites the alphas of a round; returns how many pixels refused one, since they are finished, or `None` if no pixel was
+/// finished in the round. A function of its own, as [`Alphas::find`].
 #[inline(never)]
 fn composite_all<S: Simd, const DEPTH: DepthMode>(
     accumulator: &mut Accumulator,
@@ -154,11 +172,11 @@ fn composite_all<S: Simd, const DEPTH: DepthMode>(
     reaching: &Reaching,
     (round, alphas): (&StagedRound, &Alphas),
     thresholds: Thresholds,
-) -> u64 {
+) -> Option<u64> {
     simd.vectorize(
         #[inline(always)]
         || {
-            let mut refused = 0;
+            let mut refused = None;
             let mut rest = &alphas.alphas[..];
             for (block, &reaching) in reaching.iter().enumerate() {
                 let count = reaching.count_ones() as usize;
@@ -174,13 +192,16 @@ fn composite_all<S: Simd, const DEPTH: DepthMode>(
                     || DEPTH >= FIND_MEDIAN
                     || !composite_far_from_floor(accumulator, simd, of_block, round, thresholds)
                 {
-                    refused += composite_near_floor::<_, DEPTH>(
+                    let more = composite_near_floor::<_, DEPTH>(
                         accumulator,
                         simd,
                         of_block,
                         round,
                         thresholds,
                     );
+                    if let Some(more) = more {
+                        refused = Some(refused.unwrap_or(0) + more);
+                    }
                 }
             }
             refused
@@ -210,7 +231,7 @@ fn composite_far_from_floor<S: Simd>(
     // What is finished has alphas of zero.
     pixels.transmittance = before.max(0.0);
     for alpha in alphas {
-        let look = &round.looks[reaching.trailing_zeros() as usize % ROUND];
+        let look = &round.looks[reaching.trailing_zeros() as usize];
         reaching &= reaching.wrapping_sub(1);
         let passed = pixels.pass(f32x16::from_slice(simd, alpha));
         pixels.transmittance = passed.rest;
@@ -227,8 +248,8 @@ fn composite_far_from_floor<S: Simd>(
     true
 }
 
-/// Composites a block's alphas; returns how many pixels refused one. A function of its own, so that what goes the quick way
-/// has the registers for itself.
+/// Composites a block's alphas; returns how many pixels refused one, or `None` if no pixel was finished. A function of its
+/// own, so that what goes the quick way has the registers for itself.
 #[inline(never)]
 fn composite_near_floor<S: Simd, const DEPTH: DepthMode>(
     accumulator: &mut Accumulator,
@@ -236,7 +257,7 @@ fn composite_near_floor<S: Simd, const DEPTH: DepthMode>(
     (block, mut reaching, mut alphas): (usize, u32, &[[f32; BLOCK_PIXELS]]),
     round: &StagedRound,
     thresholds: Thresholds,
-) -> u64 {
+) -> Option<u64> {
     simd.vectorize(
         #[inline(always)]
         || {
@@ -244,11 +265,13 @@ fn composite_near_floor<S: Simd, const DEPTH: DepthMode>(
                 let of_block = (block, &mut reaching, &mut alphas);
                 composite_until_finished(accumulator, simd, of_block, round, thresholds);
                 if alphas.is_empty() {
-                    return 0;
+                    return None;
                 }
             }
             let of_block = (block, reaching, alphas);
-            composite_carefully::<_, DEPTH>(accumulator, simd, of_block, round, thresholds)
+            let refused =
+                composite_carefully::<_, DEPTH>(accumulator, simd, of_block, round, thresholds);
+            Some(refused)
         },
     )
 }
@@ -274,7 +297,7 @@ fn composite_until_finished<S: Simd>(
         if passed.rest.simd_lt(floor).any_true() {
             break;
         }
-        let look = &round.looks[reaching.trailing_zeros() as usize % ROUND];
+        let look = &round.looks[reaching.trailing_zeros() as usize];
         *reaching &= reaching.wrapping_sub(1);
         *alphas = rest;
         pixels.transmittance = passed.rest;
@@ -300,11 +323,11 @@ fn composite_carefully<S: Simd, const DEPTH: DepthMode>(
     let mut pixels = pixels(accumulator, simd, block);
     let mut refused = Tally::new(simd);
     for alpha in alphas {
-        let look = &round.looks[reaching.trailing_zeros() as usize % ROUND];
+        let look = &round.looks[reaching.trailing_zeros() as usize];
         reaching &= reaching.wrapping_sub(1);
         let alpha = f32x16::from_slice(simd, alpha);
-        let (to, look) = ((block, &mut pixels), (look.color, look.depth));
-        let goes_on = composite_one(accumulator, simd, to, alpha, look, thresholds);
+        let to = (block, &mut pixels);
+        let goes_on = composite_one(accumulator, simd, to, alpha, *look, thresholds);
         refused.add_without(alpha.simd_gt(0.0), goes_on);
     }
     keep(accumulator, block, pixels);
@@ -329,7 +352,7 @@ pub(super) fn evaluate_steep<S: Simd, const DEPTH: DepthMode>(
     let mut contributions = 0;
     for block in (0..BLOCKS).filter(|block| blocks >> block & 1 == 1) {
         let fall = falls_64(simd, splat, task, block);
-        let look = (splat.color, splat.depth);
+        let look = splat.look;
         contributions += accumulate(accumulator, simd, block, fall, look, ranges, thresholds);
         accumulator.find_most_fall(simd, block, thresholds.most_fall);
     }
@@ -344,14 +367,14 @@ pub(super) fn accumulate<S: Simd>(
     simd: S,
     block: usize,
     fall: f32x16<S>,
-    look: ([f32; 3], u32),
+    look: SplatLook,
     ranges: &DepthRanges,
     thresholds: Thresholds,
 ) -> u64 {
     let mut pixels = pixels(accumulator, simd, block);
     let most_fall = f32x16::splat(simd, thresholds.most_fall);
     let mode = thresholds.depth_mode;
-    let reached = reached(simd, mode, (block, look.1), fall, ranges, most_fall);
+    let reached = reached(simd, mode, (block, look.depth), fall, ranges, most_fall);
     let ceiling = f32x16::splat(simd, thresholds.alpha_ceiling);
     let alpha = alpha(simd, mode, reached, fall, ceiling);
     let at = (block, &mut pixels);
@@ -395,7 +418,7 @@ fn composite_one<S: Simd>(
     simd: S,
     (block, pixels): (usize, &mut Pixels<S>),
     alpha: f32x16<S>,
-    (color, depth): ([f32; 3], u32),
+    SplatLook { color, depth }: SplatLook,
     thresholds: Thresholds,
 ) -> mask32x16<S> {
     let t = pixels.transmittance;

@@ -1,40 +1,71 @@
 //! Phase 1 of the tile kernel: what the others need of a round's Gaussians in a tile, and which blocks each may reach.
 
 use super::depth_ranges::DepthRanges;
-use super::grid::{BLOCK_PIXELS, BLOCKS, BLOCKS_ACROSS, BlockMiddles, HALF, LANE_X, LANE_Y, ROUND};
+use super::grid::{
+    BLOCK_PIXELS, BLOCKS, BLOCKS_ACROSS, BlockMiddles, HALF, LANE_X, LANE_Y, PLACES, ROUND,
+};
 use super::inputs::{DepthMode, NO_DEPTH, TileInputs};
-use crate::gaussian::splat::Splat;
+use crate::gaussian::splat::{Splat, SplatLook};
 use crate::stats::optimizations::Optimization;
-use fearless_simd::{Simd, f32x8, f32x16, f64x4, mask32x16, prelude::*};
+use fearless_simd::{Simd, f32x8, f32x16, f64x4, i32x16, mask32x16, prelude::*, u32x16};
 
 /// What rounding may do to exponents, relative to them.
 const ROOM_FACTOR: f32 = 1.0 + 1e-5;
 
-/// Which of a round's Gaussians may reach each block: a bit for each.
+/// The Gaussians of a round that may reach each block: a bit for each.
 pub(super) type Reaching = [u32; BLOCKS];
 
+/// The same while they are found: the bits of eight Gaussians a byte.
+type ReachingBytes = [[u8; ROUND / 8]; BLOCKS];
+
 /// A round's Gaussians in a tile.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 #[repr(align(64))]
 pub(super) struct StagedRound {
     /// `u` at the middle of each column of blocks, by column and then by Gaussian.
-    u: [[f32; ROUND]; BLOCKS_ACROSS],
+    u: [[f32; PLACES]; BLOCKS_ACROSS],
     /// `v` at the middle of each block, by block and then by Gaussian.
-    v: [[f32; ROUND]; BLOCKS],
+    v: [[f32; PLACES]; BLOCKS],
     gathered: Gathered,
-    records: [StagedSplat; ROUND],
-    pub(super) looks: [SplatColor; ROUND],
+    /// Records and looks of the Gaussians that may reach a block.
+    records: [StagedSplat; PLACES],
+    pub(super) looks: [SplatLook; PLACES],
+}
+
+impl Default for StagedRound {
+    fn default() -> Self {
+        Self {
+            u: [[0.0; PLACES]; BLOCKS_ACROSS],
+            v: [[0.0; PLACES]; BLOCKS],
+            gathered: Gathered::default(),
+            records: [StagedSplat::default(); PLACES],
+            looks: [SplatLook::default(); PLACES],
+        }
+    }
 }
 
 /// Numbers by which several Gaussians are placed at a time: by element, and then by Gaussian.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Gathered {
     mean: [[f64; ROUND]; 2],
     factor: [[f64; ROUND]; 3],
     /// The factor, rounded.
-    narrow: [[f32; ROUND]; 3],
+    narrow: [[f32; PLACES]; 3],
     log2_opacity: [f32; ROUND],
+    /// Depths, if they are tested.
     depth: [u32; ROUND],
+}
+
+impl Default for Gathered {
+    fn default() -> Self {
+        Self {
+            mean: [[0.0; ROUND]; 2],
+            factor: [[0.0; ROUND]; 3],
+            narrow: [[0.0; PLACES]; 3],
+            log2_opacity: [0.0; ROUND],
+            depth: [0; ROUND],
+        }
+    }
 }
 
 /// Numbers that finding alphas takes, but for `v` at the middles of blocks.
@@ -48,23 +79,15 @@ struct StagedSplat {
     along: [f32; BLOCK_PIXELS],
 }
 
-/// What it takes to composite.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct SplatColor {
-    pub(super) color: [f32; 3],
-    /// As [`Splat::depth`].
-    pub(super) depth: u32,
-}
-
-/// What became of a round's Gaussians, up to a steep one.
+/// The outcome of placing a round's Gaussians, up to a steep one.
 #[derive(Debug, Default)]
 pub(super) struct Placed {
     pub(super) reaching: Reaching,
-    /// How many there are.
+    /// The number of Gaussians placed.
     pub(super) count: u64,
-    /// The round's first that is steep from where they begin, or its end.
+    /// The number in the round of the first steep Gaussian from where they begin, or the round's length.
     pub(super) end: usize,
-    /// Those that depths hide in all of the tile.
+    /// Gaussians that depths hide in all of the tile.
     pub(super) tiles_hidden: u64,
     /// Blocks in which depths hide the others.
     pub(super) blocks_hidden: u64,
@@ -95,7 +118,7 @@ impl StagedRound {
                     if let Some(&primitive) = next.get(number) {
                         ahead[number % ROUND] = task.prefetched(primitive);
                     }
-                    if DEPTH > NO_DEPTH && ranges.hides(splat.depth) {
+                    if DEPTH > NO_DEPTH && ranges.hides(splat.look.depth) {
                         number += 1;
                         placed.tiles_hidden += 1;
                         if is_recorded {
@@ -106,33 +129,48 @@ impl StagedRound {
                     if splat.needs_f64 {
                         break;
                     }
-                    self.gather(number % ROUND, splat);
+                    self.gather::<DEPTH>(number % ROUND, splat);
                     present |= 1 << (number % ROUND);
                     number += 1;
                 }
                 placed.end = number;
                 placed.count = present.count_ones().into();
-                let bounded = task.optimizations.has(Optimization::Blocks);
                 let middles = BlockMiddles::new(task.corner);
-                let mut reaching = [0; BLOCKS];
+                let mut reaching = [[0; ROUND / 8]; BLOCKS];
                 for first in (from / S::f32s::LEN * S::f32s::LEN..number).step_by(S::f32s::LEN) {
                     let most_fall = task.thresholds.most_fall;
                     self.find_blocks(simd, first, &middles, most_fall, &mut reaching);
                 }
-                for number in from..number {
-                    self.record(simd, number % ROUND);
+                let mut reaching = u32x16::simd_from(simd, words_of(reaching));
+                if !task.optimizations.has(Optimization::Blocks) {
+                    reaching = u32x16::splat(simd, u32::MAX);
                 }
-                for (block, reaching) in reaching.iter_mut().enumerate() {
-                    let is_open = open >> block & 1 == 1;
-                    let all = if bounded { *reaching } else { u32::MAX };
-                    *reaching = if is_open { all & present } else { 0 };
-                    if DEPTH > NO_DEPTH && *reaching != 0 {
+                let open: i32x16<S> = open_mask.to_vector();
+                let mut reaching = reaching & open.bitcast::<u32x16<S>>() & present;
+                if DEPTH > NO_DEPTH {
+                    let mut words = reaching.to_array();
+                    for (block, word) in words.iter_mut().enumerate().filter(|(_, word)| **word > 0)
+                    {
                         let shown = ranges.shown(simd, block, &self.gathered.depth);
-                        placed.blocks_hidden += u64::from((*reaching & !shown).count_ones());
-                        *reaching &= shown;
+                        placed.blocks_hidden += u64::from((*word & !shown).count_ones());
+                        *word &= shown;
+                    }
+                    reaching = u32x16::simd_from(simd, words);
+                }
+                let (low, high) = reaching.split();
+                let (low, high) = (low | high).split();
+                let mut any = (low | high)
+                    .to_array()
+                    .into_iter()
+                    .fold(0, |any, word| any | word);
+                while any != 0 {
+                    let number = any.trailing_zeros() as usize;
+                    any &= any - 1;
+                    if let Some(splat) = round.get(number) {
+                        self.record(simd, number, splat);
                     }
                 }
-                placed.reaching = reaching;
+                placed.reaching = reaching.to_array();
                 placed
             },
         )
@@ -140,7 +178,7 @@ impl StagedRound {
 
     /// Makes `splat` the round's Gaussian `number`.
     #[inline(always)]
-    fn gather(&mut self, number: usize, splat: &Splat) {
+    fn gather<const DEPTH: DepthMode>(&mut self, number: usize, splat: &Splat) {
         let Gathered {
             mean,
             factor,
@@ -155,23 +193,18 @@ impl StagedRound {
             lanes[number] = part;
         }
         log2_opacity[number] = splat.log2_opacity;
-        depth[number] = splat.depth;
-        self.looks[number] = SplatColor {
-            color: splat.color,
-            depth: splat.depth,
-        };
+        if DEPTH > NO_DEPTH {
+            depth[number] = splat.look.depth;
+        }
     }
 
-    /// Makes the record of Gaussian `number`, whose `u` is known.
+    /// Makes the record and the look of `splat`, the round's Gaussian `number`, whose `u` is known.
     #[inline(always)]
-    fn record<S: Simd>(&mut self, simd: S, number: usize) {
-        let Gathered {
-            narrow,
-            log2_opacity,
-            ..
-        } = &self.gathered;
+    fn record<S: Simd>(&mut self, simd: S, number: usize, splat: &Splat) {
+        self.looks[number] = splat.look;
+        let narrow = &self.gathered.narrow;
         let [a, b, c] = [narrow[0][number], narrow[1][number], narrow[2][number]];
-        let log2_opacity = f32x8::splat(simd, log2_opacity[number]);
+        let log2_opacity = f32x8::splat(simd, splat.log2_opacity);
         let record = &mut self.records[number];
         let columns = f32x8::from_slice(simd, &LANE_X[..BLOCK_PIXELS / 2]);
         let across = columns * a;
@@ -194,7 +227,7 @@ impl StagedRound {
         first: usize,
         middles: &BlockMiddles,
         most_fall: f32,
-        reaching: &mut Reaching,
+        reaching: &mut ReachingBytes,
     ) {
         let lanes = first..first + S::f32s::LEN;
         let wide = |lanes: &[f64; ROUND]| -> Wide<S> {
@@ -245,8 +278,8 @@ impl StagedRound {
                 // The least |u| and |v| over a block's centres, each for itself: together they bound u^2 + v^2.
                 let least_v = (v.abs() - around_v).max(zero);
                 let least = least_v.mul_add(least_v, least_u[column]);
-                let may_reach = least.simd_le(room).to_bitmask() as u32;
-                reaching[block] |= may_reach << first;
+                let may_reach = least.simd_le(room).to_bitmask();
+                set_bits(&mut reaching[block], first, S::f32s::LEN, may_reach);
             }
         }
     }
@@ -259,6 +292,27 @@ impl StagedRound {
         let v = f32x16::from_slice(simd, &record.along) + self.v[block][number];
         v.mul_add(v, from_u.combine(from_u))
     }
+}
+
+/// Sets the bits of `count` Gaussians from number `first` on, a multiple of `count`, in bytes where they are zero.
+#[inline(always)]
+fn set_bits(bytes: &mut [u8; ROUND / 8], first: usize, count: usize, bits: u64) {
+    let at = first / 8 % bytes.len();
+    match count {
+        8 => bytes[at] = bits as u8,
+        16 => bytes[at & !1..][..2].copy_from_slice(&(bits as u16).to_le_bytes()),
+        _ => bytes[at] |= (bits << (first % 8)) as u8,
+    }
+}
+
+/// The words of which these are the bytes, the lowest first.
+#[inline(always)]
+fn words_of(bytes: ReachingBytes) -> Reaching {
+    let mut words: Reaching = bytemuck::cast(bytes);
+    for word in &mut words {
+        *word = u32::from_le(*word);
+    }
+    words
 }
 
 /// A binary64 number for each lane of a vector of binary32.
