@@ -82,12 +82,15 @@ impl Alphas {
                     };
                     items = others;
                     count_of_all += count as u64;
+                    let Some(column) = round.column(block) else {
+                        break;
+                    };
                     let most_fall = f32x16::from_slice(simd, &most_fall[block]);
                     let mut rest = reaching;
                     for to in alphas {
                         let number = rest.trailing_zeros() as usize;
                         rest &= rest.wrapping_sub(1);
-                        let fall = round.falls(simd, number, block);
+                        let fall = round.falls(simd, number, (block, column));
                         let at = (block, round.looks[number].depth);
                         let reached = reached(simd, DEPTH, at, fall, ranges, most_fall);
                         pixels.add(reached);
@@ -254,16 +257,18 @@ fn composite_far_from_floor<S: Simd>(
 fn composite_near_floor<S: Simd, const DEPTH: DepthMode>(
     accumulator: &mut Accumulator,
     simd: S,
-    (block, mut reaching, mut alphas): (usize, u32, &[[f32; BLOCK_PIXELS]]),
+    (block, reaching, alphas): (usize, u32, &[[f32; BLOCK_PIXELS]]),
     round: &StagedRound,
     thresholds: Thresholds,
 ) -> Option<u64> {
     simd.vectorize(
         #[inline(always)]
         || {
+            let (mut reaching, mut alphas) = (reaching, alphas);
             if DEPTH != FIND_REACHED && DEPTH < FIND_MEDIAN {
-                let of_block = (block, &mut reaching, &mut alphas);
-                composite_until_finished(accumulator, simd, of_block, round, thresholds);
+                let of_block = (block, reaching, alphas);
+                (reaching, alphas) =
+                    composite_until_finished(accumulator, simd, of_block, round, thresholds);
                 if alphas.is_empty() {
                     return None;
                 }
@@ -276,15 +281,18 @@ fn composite_near_floor<S: Simd, const DEPTH: DepthMode>(
     )
 }
 
-/// Composites the first of a block's alphas, up to one that finishes a pixel, and leaves the others.
+/// Alphas of a block, in order, and bits for the numbers of their Gaussians.
+type BlockAlphas<'a> = (u32, &'a [[f32; BLOCK_PIXELS]]);
+
+/// Composites the first of a block's alphas, up to one that finishes a pixel, and returns the others.
 #[inline(always)]
-fn composite_until_finished<S: Simd>(
+fn composite_until_finished<'a, S: Simd>(
     accumulator: &mut Accumulator,
     simd: S,
-    (block, reaching, alphas): (usize, &mut u32, &mut &[[f32; BLOCK_PIXELS]]),
+    (block, mut reaching, mut alphas): (usize, u32, &'a [[f32; BLOCK_PIXELS]]),
     round: &StagedRound,
     thresholds: Thresholds,
-) {
+) -> BlockAlphas<'a> {
     let floor = f32x16::splat(simd, thresholds.transmittance_floor);
     let mut pixels = pixels(accumulator, simd, block);
     let before = pixels.transmittance;
@@ -292,22 +300,23 @@ fn composite_until_finished<S: Simd>(
     // What is finished has alphas of zero: here it has light that stays.
     let light = f32x16::splat(simd, f32::MAX);
     pixels.transmittance = signs.simd_lt(0).select(light, before);
-    while let [alpha, rest @ ..] = *alphas {
+    while let [alpha, rest @ ..] = alphas {
         let passed = pixels.pass(f32x16::from_slice(simd, alpha));
         if passed.rest.simd_lt(floor).any_true() {
             break;
         }
         let look = &round.looks[reaching.trailing_zeros() as usize];
-        *reaching &= reaching.wrapping_sub(1);
-        *alphas = rest;
+        reaching &= reaching.wrapping_sub(1);
+        alphas = rest;
         pixels.transmittance = passed.rest;
         pixels.add(simd, passed.weight, look.color);
     }
     pixels.transmittance = signs.simd_lt(0).select(before, pixels.transmittance);
     keep(accumulator, block, pixels);
+    (reaching, alphas)
 }
 
-/// Composites a block's alphas; returns how many pixels refused one.
+/// Composites a block's alphas; returns the number of pixels that refused one.
 #[inline(always)]
 fn composite_carefully<S: Simd, const DEPTH: DepthMode>(
     accumulator: &mut Accumulator,

@@ -20,17 +20,24 @@ type ReachingBytes = [[u8; ROUND / 8]; BLOCKS];
 
 /// A round's Gaussians in a tile.
 #[derive(Debug)]
-#[repr(align(64))]
+#[repr(C, align(64))]
 pub(super) struct StagedRound {
     /// `u` at the middle of each column of blocks, by column and then by Gaussian.
     u: [[f32; PLACES]; BLOCKS_ACROSS],
     /// `v` at the middle of each block, by block and then by Gaussian.
     v: [[f32; PLACES]; BLOCKS],
-    gathered: Gathered,
-    /// Records and looks of the Gaussians that may reach a block.
-    records: [StagedSplat; PLACES],
+    /// By pair of columns of blocks, then by Gaussian, then by column of the pair: `u^2` less the logarithm of the opacity at
+    /// the pixels of two rows of a block. Its other two rows have the same. As are `along` and `looks`, it is there for Gaussians
+    /// that may reach a block.
+    from_u: [[[f32; BLOCK_PIXELS / 2]; 2 * PLACES]; BLOCKS_ACROSS / 2],
+    /// By Gaussian, the addition of a pixel's offset from the middle of its block to `v` there.
+    along: [[f32; BLOCK_PIXELS]; PLACES],
     pub(super) looks: [SplatLook; PLACES],
+    gathered: Gathered,
 }
+
+/// The squares of `u` in a column of blocks: those of Gaussian `number` are at twice that number.
+pub(super) type ColumnSquares = [[f32; BLOCK_PIXELS / 2]; 2 * PLACES - 1];
 
 impl Default for StagedRound {
     fn default() -> Self {
@@ -38,7 +45,8 @@ impl Default for StagedRound {
             u: [[0.0; PLACES]; BLOCKS_ACROSS],
             v: [[0.0; PLACES]; BLOCKS],
             gathered: Gathered::default(),
-            records: [StagedSplat::default(); PLACES],
+            from_u: [[[0.0; BLOCK_PIXELS / 2]; 2 * PLACES]; BLOCKS_ACROSS / 2],
+            along: [[0.0; BLOCK_PIXELS]; PLACES],
             looks: [SplatLook::default(); PLACES],
         }
     }
@@ -66,17 +74,6 @@ impl Default for Gathered {
             depth: [0; ROUND],
         }
     }
-}
-
-/// Numbers that finding alphas takes, but for `v` at the middles of blocks.
-#[derive(Clone, Copy, Debug, Default)]
-#[repr(C, align(64))]
-struct StagedSplat {
-    /// By column of blocks, `u^2` less the logarithm of the opacity at the pixels of two rows: both pairs of a block's rows
-    /// have the same.
-    from_u: [[f32; BLOCK_PIXELS / 2]; BLOCKS_ACROSS],
-    /// What a pixel's offset from the middle of its block adds to `v` there.
-    along: [f32; BLOCK_PIXELS],
 }
 
 /// The outcome of placing a round's Gaussians, up to a steep one.
@@ -198,24 +195,26 @@ impl StagedRound {
         }
     }
 
-    /// Makes the record and the look of `splat`, the round's Gaussian `number`, whose `u` is known.
+    /// Finds `from_u`, `along` and the look of `splat`, the round's Gaussian `number`, whose `u` is known.
     #[inline(always)]
     fn record<S: Simd>(&mut self, simd: S, number: usize, splat: &Splat) {
         self.looks[number] = splat.look;
         let narrow = &self.gathered.narrow;
         let [a, b, c] = [narrow[0][number], narrow[1][number], narrow[2][number]];
         let log2_opacity = f32x8::splat(simd, splat.log2_opacity);
-        let record = &mut self.records[number];
         let columns = f32x8::from_slice(simd, &LANE_X[..BLOCK_PIXELS / 2]);
         let across = columns * a;
-        for (from_u, u) in record.from_u.iter_mut().zip(&self.u) {
-            let u = across + u[number];
-            u.mul_sub(u, log2_opacity).store_slice(from_u);
+        for (from_u, u) in self.from_u.iter_mut().zip(self.u.as_chunks::<2>().0) {
+            for (column, u) in u.iter().enumerate() {
+                let u = across + u[number];
+                let to = &mut from_u[2 * number + column];
+                u.mul_sub(u, log2_opacity).store_slice(to);
+            }
         }
         let sheared = columns * b;
         let rows = f32x16::simd_from(simd, LANE_Y);
         let along = rows.mul_add(f32x16::splat(simd, c), sheared.combine(sheared));
-        along.store_slice(&mut record.along);
+        along.store_slice(&mut self.along[number]);
     }
 
     /// Finds `u` and `v` of the Gaussians from number `first` on, as many as a vector has lanes, and which blocks each may
@@ -284,12 +283,22 @@ impl StagedRound {
         }
     }
 
-    /// How far alpha has fallen at a block's pixels: minus its base-2 logarithm.
+    /// The squares of `u` in a block's column of blocks.
     #[inline(always)]
-    pub(super) fn falls<S: Simd>(&self, simd: S, number: usize, block: usize) -> f32x16<S> {
-        let record = &self.records[number];
-        let from_u = f32x8::from_slice(simd, &record.from_u[block % BLOCKS_ACROSS]);
-        let v = f32x16::from_slice(simd, &record.along) + self.v[block][number];
+    pub(super) fn column(&self, block: usize) -> Option<&ColumnSquares> {
+        self.from_u[block % BLOCKS_ACROSS / 2][block % 2..].first_chunk()
+    }
+
+    /// The fall of a Gaussian's alpha at a block's pixels: minus its base-2 logarithm. `column` is that of the block.
+    #[inline(always)]
+    pub(super) fn falls<S: Simd>(
+        &self,
+        simd: S,
+        number: usize,
+        (block, column): (usize, &ColumnSquares),
+    ) -> f32x16<S> {
+        let from_u = f32x8::from_slice(simd, &column[2 * number]);
+        let v = f32x16::from_slice(simd, &self.along[number]) + self.v[block][number];
         v.mul_add(v, from_u.combine(from_u))
     }
 }
