@@ -1,4 +1,4 @@
-//! What projection makes of Gaussians: the rasterizer's nine numbers, and what goes with them.
+//! Projected Gaussians: the rasterizer's nine numbers, and what goes with them.
 
 use super::footprint::{TileFootprint, TileSpan};
 use super::lanes::GROUP;
@@ -23,9 +23,9 @@ pub(crate) struct Splat {
     /// Base-2 logarithm of the opacity.
     pub log2_opacity: f32,
     pub look: SplatLook,
-    /// Whether its exponent is a difference of numbers so large that binary32 would lose it.
+    /// True if its exponent is a difference of numbers so large that binary32 would lose it.
     pub needs_f64: bool,
-    /// Whether it is wider than the period of a panorama: it then counts within half a period of its mean only, where
+    /// True if it is wider than the period of a panorama: it then counts within half a period of its mean only, where
     /// its copies do not. Such a one is steep.
     pub exceeds_period: bool,
 }
@@ -55,14 +55,15 @@ impl Splat {
     }
 }
 
-/// The greatest logarithm of the opacity for which exponents are formed in binary32: what is lost of them grows with it.
+/// The greatest logarithm of the opacity for which exponents are formed in binary32: what is lost of them grows with
+/// it.
 const STEEP_LOG2_OPACITY: f64 = 4.0;
 
 /// The greatest factor, in 1/px, for which they are: from a block's middle a pixel is 1.5 times this away. A low-pass
 /// variance of 0.3 px^2 keeps all factors below 1.6.
 const STEEP_FACTOR: f64 = 8.0;
 
-/// Which Gaussians' exponents must be formed in binary64. It depends on each Gaussian alone.
+/// The Gaussians whose exponents must be formed in binary64. It depends on each Gaussian alone.
 #[inline(always)]
 pub(super) fn are_steep<S: Simd>(factor: [S::f64s; 3], log2_opacity: S::f64s) -> S::mask64s {
     // The first and the last one are never negative. What is not a number is no greater.
@@ -76,9 +77,9 @@ pub(super) const LEAST_HALF_FACTOR: f64 = 1.0 / 16384.0;
 
 /// How far, in units of `u^2 + v^2`, what is rasterized in binary16 reaches where exact arithmetic reaches `room`.
 ///
-/// With a unit roundoff of 2^-11, `u` and the two terms of `v` err by three units each, and `v` by one more. The terms of
-/// `v` are at most `|v| + 2 |factor[1] / factor[0]| |u|`, so that needles, where they cancel, err most. Sums, exponent,
-/// logarithm, power and floor add less than a quarter.
+/// With a unit roundoff of 2^-11, `u` and the two terms of `v` err by three units each, and `v` by one more. The terms
+/// of `v` are at most `|v| + 2 |factor[1] / factor[0]| |u|`, so that needles, where they cancel, err most. Sums,
+/// exponent, logarithm, power and floor add less than a quarter.
 pub(crate) fn binary16_headroom(factor: [f64; 3], room: f64) -> f64 {
     const UNIT: f64 = 1.0 / 2048.0;
     let [a, b, c] = factor.map(f64::abs);

@@ -72,7 +72,7 @@ pub fn update_buffer(target: &BufferRange, data: &[u8]) {
     target.memory.bump_generation();
 }
 
-/// Which way a copy between a buffer and an image goes.
+/// The direction of a copy between a buffer and an image.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Direction {
     /// [`Packet::CopyBufferToImage`](crate::Packet::CopyBufferToImage).
@@ -126,8 +126,8 @@ fn copy_layer(
         )
     });
     let size = u64::from(x.count) * texel_size;
-    // The offset of `size` bytes from a row's first copied texel on, in the buffer's memory; `None` if that overflows or lies
-    // outside the buffer.
+    // The offset of `size` bytes from a row's first copied texel on, in the buffer's memory; `None` if that overflows
+    // or lies outside the buffer.
     let buffer_offset = |row: u32, slice: u32, size: u64| {
         let slice = u64::from(index)
             .checked_mul(depth.into())?
@@ -142,7 +142,8 @@ fn copy_layer(
         within(&copy.buffer, offset, size)
     };
     let (image, buffer) = (&copy.image, &copy.buffer.memory);
-    // Copies `count` rows of a slice, which follow one another without a gap. Returns false if they do not fit the buffer.
+    // Copies `count` rows of a slice, which follow one another without a gap. Returns false if they do not fit the
+    // buffer.
     let copy_rows = |row: u32, slice: u32, count: u32| {
         let all = size * u64::from(count);
         let at = [x.first, y.first + row, z.first + slice];

@@ -1,8 +1,8 @@
 //! binary16 rasterization: every operation of a processing element is rounded to binary16.
 //!
-//! Numbers are held as binary32. Sums and products of binary16 numbers, rounded to binary32 and from there to binary16, are
-//! what a binary16 unit gives. The mean and the pixel meet before, in binary64: their difference is what an element is
-//! given, rounded. Powers of two come from the polynomial of binary32, unfused, rounded. Nothing depends on the SIMD
+//! Numbers are held as binary32. Sums and products of binary16 numbers, rounded to binary32 and from there to binary16,
+//! are what a binary16 unit gives. The mean and the pixel meet before, in binary64: their difference is what an element
+//! is given, rounded. Powers of two come from the polynomial of binary32, unfused, rounded. Nothing depends on the SIMD
 //! level, and [`scalar`] says the same without vectors.
 
 use super::accumulator::Accumulator;
@@ -92,7 +92,7 @@ impl BlockKernel for Half {
     }
 }
 
-/// How far a block's pixels are from a Gaussian's mean, rounded.
+/// The offsets of a block's pixels from a Gaussian's mean, rounded.
 #[inline(always)]
 fn offsets<S: Simd>(simd: S, splat: &Splat, corner: [u32; 2], block: usize) -> [f32x16<S>; 2] {
     let middle = |axis: usize, block: f64| block + (f64::from(corner[axis]) - splat.mean[axis]);
@@ -152,7 +152,7 @@ fn accumulate<S: Simd>(
     u64::from(accepted.count_ones())
 }
 
-/// What an element is given of a draw.
+/// The constants of a draw, as an element has them.
 fn rounded(thresholds: &Thresholds) -> Thresholds {
     Thresholds {
         alpha_floor: scalar::round(thresholds.alpha_floor),
@@ -162,7 +162,7 @@ fn rounded(thresholds: &Thresholds) -> Thresholds {
     }
 }
 
-/// What binary16 rasterization is, one number at a time.
+/// The definition of binary16 rasterization, one number at a time.
 pub(super) mod scalar {
     use crate::gaussian::splat::Splat;
 
@@ -186,7 +186,7 @@ pub(super) mod scalar {
     /// The greatest binary16 number.
     const GREATEST: f32 = 65504.0;
 
-    /// What an element is given of a Gaussian.
+    /// The numbers of a Gaussian, as an element has them.
     #[derive(Clone, Copy, Debug)]
     pub(in super::super) struct Splat16 {
         pub(super) factor: [f32; 3],
@@ -211,7 +211,7 @@ pub(super) mod scalar {
     #[cfg(test)]
     pub(in super::super) use definition::*;
 
-    /// What vectors are tested against.
+    /// The definition that vectors are tested against.
     #[cfg(test)]
     mod definition {
         use super::{Splat16, round};
@@ -228,7 +228,7 @@ pub(super) mod scalar {
             ))
         }
 
-        /// What an element is given of the draw.
+        /// The constants of the draw, as an element has them.
         #[derive(Clone, Copy, Debug)]
         pub(crate) struct State {
             pub(crate) alpha_floor: f32,
@@ -259,7 +259,7 @@ pub(super) mod scalar {
             exp2(exponent).min(state.alpha_ceiling)
         }
 
-        /// What an element accumulates.
+        /// The sums of an element.
         #[derive(Clone, Copy, Debug)]
         pub(crate) struct Pixel {
             pub(crate) color: [f32; 3],

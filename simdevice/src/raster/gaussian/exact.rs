@@ -3,9 +3,9 @@
 //!
 //! Sums are in binary64 for draws whose floors let more accumulators be seen through each other than the usual ones do.
 //!
-//! Each accumulator rounds the transmittance and the colour of a pixel. With the usual floors a pixel ends before that is
-//! worth much; without them errors of thousands of accumulators add up beyond the contract. A block's whole list is worked off
-//! at once here, so that its sums stay at hand and are rounded to binary32 only in the end.
+//! Each accumulator rounds the transmittance and the colour of a pixel. With the usual floors a pixel ends before that
+//! is worth much; without them errors of thousands of accumulators add up beyond the contract. A block's whole list is
+//! worked off at once here, so that its sums stay at hand and are rounded to binary32 only in the end.
 
 use super::accumulator::Accumulator;
 use super::block_lists::BlockKernel;
@@ -17,7 +17,7 @@ use crate::gaussian::splat::SplatLook;
 use crate::simd::exp2::exp2_of_negated;
 use fearless_simd::{Simd, f32x16, f64x8, mask64x8, prelude::*};
 
-/// What the pixels of a block accumulate; signs of transmittances as in [`Accumulator`].
+/// The sums of a block's pixels; signs of transmittances as in [`Accumulator`].
 #[derive(Clone, Copy)]
 #[repr(align(64))]
 struct Sums {
@@ -40,7 +40,7 @@ impl Sums {
         accumulator.transmittance[block] = self.transmittance.map(|t| t as f32);
     }
 
-    /// Whether a pixel is not finished.
+    /// True if a pixel is not finished.
     fn is_open(&self) -> bool {
         self.transmittance.iter().any(|t| t.is_sign_positive())
     }
@@ -62,7 +62,7 @@ impl Sums {
         (low.0.narrow(high.0), low.1 | high.1)
     }
 
-    /// As [`Sums::add`], in half of the lanes.
+    /// Does what [`Sums::add`] does, in half of the lanes.
     #[inline(always)]
     fn add_half<S: Simd>(
         &mut self,
@@ -167,7 +167,7 @@ impl BlockKernel for WideSums {
     }
 }
 
-/// As [`accumulate`], to sums that are kept elsewhere.
+/// Does what [`accumulate`] does, to sums that are kept elsewhere.
 #[inline(always)]
 fn accumulate_wide<S: Simd>(
     accumulator: &mut Accumulator,
@@ -208,7 +208,7 @@ fn accumulate_wide<S: Simd>(
     u64::from(accepted.count_ones())
 }
 
-/// How far a primitive's alpha has fallen at a block's pixels.
+/// The fall of a primitive's alpha at a block's pixels: minus its base-2 logarithm.
 #[inline(always)]
 pub(super) fn falls<S: Simd>(
     simd: S,

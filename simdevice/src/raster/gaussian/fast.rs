@@ -1,6 +1,6 @@
-//! The fast kernel: volumes in the order of a tile's list, a round of 32 after the other. Each round is staged ([`staging`]):
-//! what the others need of its Gaussians, and which blocks each may reach. Then the alphas of all that are reached are found,
-//! and then blended, block by block ([`pixels`]).
+//! The fast kernel: volumes in the order of a tile's list, a round of 32 after the other. Each round is staged
+//! ([`staging`]): what the others need of its Gaussians, and which blocks each may reach. Then the alphas of all that
+//! are reached are found, and then blended, block by block ([`pixels`]).
 //!
 //! [`staging`]: super::staging
 //! [`pixels`]: super::pixels
@@ -17,7 +17,7 @@ use crate::stats::recorder;
 use crate::stats::recorder::Run;
 use fearless_simd::{Simd, mask32x16, prelude::*};
 
-/// What the kernel needs besides the pixels.
+/// The kernel's scratch besides the pixels.
 #[derive(Debug, Default)]
 pub(super) struct FastScratch {
     staged: StagedRound,
@@ -30,7 +30,7 @@ pub(super) struct FastScratch {
 struct Open {
     /// A bit for each.
     bits: u64,
-    /// How many they are.
+    /// The number of them.
     blocks: u8,
     /// Rows of pixels with an unfinished one, if work is recorded.
     rows: u8,
@@ -39,7 +39,7 @@ struct Open {
 /// Gaussians that are composited together.
 struct Round<'a> {
     splats: &'a [&'a Splat],
-    /// Those of the round after.
+    /// The primitives of the round after.
     next: &'a [u32],
     open: Open,
     is_recorded: bool,
@@ -129,8 +129,8 @@ pub(super) fn composite<S: Simd, const DEPTH: DepthMode>(
     work
 }
 
-/// The blocks that are not finished, a bit for each, before the `rest` of a list. Counts those that are left out since they
-/// have too little light.
+/// The blocks that are not finished, a bit for each, before the `rest` of a list. Counts those that are left out since
+/// they have too little light.
 #[inline(always)]
 fn open_blocks<S: Simd, const DEPTH: DepthMode>(
     simd: S,
@@ -227,7 +227,7 @@ fn composite_round<'a, S: Simd, const DEPTH: DepthMode>(
     outcome
 }
 
-/// What a trace tells of the Gaussians at a list's end that depths hide in all of the tile.
+/// The record in a trace of the Gaussians at a list's end that depths hide in all of the tile.
 #[inline(always)]
 fn hidden_run<S: Simd>(simd: S, task: &TileInputs<'_>, rest: &[u32], open: Open) -> Run {
     let mut run = Run {

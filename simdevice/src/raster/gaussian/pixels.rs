@@ -1,5 +1,5 @@
-//! Phases 2 and 3 of the tile kernel: the alphas of Gaussians in blocks, and those through the pixels of a block, which stay in
-//! registers.
+//! Phases 2 and 3 of the tile kernel: the alphas of Gaussians in blocks, and those through the pixels of a block, which
+//! stay in registers.
 
 use super::accumulator::Accumulator;
 use super::depth_ranges::DepthRanges;
@@ -15,7 +15,7 @@ use crate::mistakes::Mistake;
 use crate::simd::bits_of;
 use fearless_simd::{Simd, f32x16, f64x8, i32x16, mask32x16, prelude::*, u32x16};
 
-/// What a block's pixels have accumulated.
+/// The sums of a block's pixels.
 ///
 /// Nothing here is indexed or iterated over, or it would leave the registers.
 #[derive(Clone, Copy)]
@@ -26,9 +26,9 @@ struct Pixels<S: Simd> {
     transmittance: f32x16<S>,
 }
 
-/// What a Gaussian does to a block's pixels.
+/// A Gaussian's effect on a block's pixels.
 struct Passed<S: Simd> {
-    /// What it contributes.
+    /// Its contribution.
     weight: f32x16<S>,
     /// The transmittance behind it.
     rest: f32x16<S>,
@@ -54,11 +54,11 @@ impl Default for Alphas {
 }
 
 impl Alphas {
-    /// Finds the alphas of all Gaussians in the blocks that they may reach. Returns the number of pixels that they reach, of
-    /// those that are not finished, and the number of pairs of a Gaussian and a block.
+    /// Finds the alphas of all Gaussians in the blocks that they may reach. Returns the number of pixels that they
+    /// reach, of those that are not finished, and the number of pairs of a Gaussian and a block.
     ///
-    /// They come before any is composited, since they do not depend on each other: several are on their way at a time. A
-    /// function of its own, so that its constants have the registers for themselves.
+    /// They come before any is composited, since they do not depend on each other: several are on their way at a time.
+    /// A function of its own, so that its constants have the registers for themselves.
     #[inline(never)]
     fn find<S: Simd, const DEPTH: DepthMode>(
         &mut self,
@@ -122,7 +122,8 @@ fn reached<S: Simd>(
     }
 }
 
-/// The alphas of pixels where they have fallen so far; zero where nothing is reached: too far down, powers mean nothing.
+/// The alphas of pixels where they have fallen so far; zero where nothing is reached: too far down, powers mean
+/// nothing.
 #[inline(always)]
 fn alpha<S: Simd>(
     simd: S,
@@ -166,8 +167,8 @@ pub(super) fn evaluate<S: Simd, const DEPTH: DepthMode>(
     }
 }
 
-/// Composites the alphas of a round; returns how many pixels refused one, since they are finished, or `None` if no pixel was
-/// finished in the round. A function of its own, as [`Alphas::find`].
+/// Composites the alphas of a round; returns how many pixels refused one, since they are finished, or `None` if no
+/// pixel was finished in the round. A function of its own, as [`Alphas::find`].
 #[inline(never)]
 fn composite_all<S: Simd, const DEPTH: DepthMode>(
     accumulator: &mut Accumulator,
@@ -212,8 +213,8 @@ fn composite_all<S: Simd, const DEPTH: DepthMode>(
     )
 }
 
-/// Composites a block's alphas, if no pixel comes so near the floor that it is finished; else it changes nothing. Returns
-/// whether it did.
+/// Composites a block's alphas, if no pixel comes so near the floor that it is finished; else it changes nothing.
+/// Returns whether it did.
 #[inline(always)]
 fn composite_far_from_floor<S: Simd>(
     accumulator: &mut Accumulator,
@@ -251,8 +252,8 @@ fn composite_far_from_floor<S: Simd>(
     true
 }
 
-/// Composites a block's alphas; returns how many pixels refused one, or `None` if no pixel was finished. A function of its
-/// own, so that what goes the quick way has the registers for itself.
+/// Composites a block's alphas; returns how many pixels refused one, or `None` if no pixel was finished. A function of
+/// its own, so that what goes the quick way has the registers for itself.
 #[inline(never)]
 fn composite_near_floor<S: Simd, const DEPTH: DepthMode>(
     accumulator: &mut Accumulator,
@@ -344,7 +345,8 @@ fn composite_carefully<S: Simd, const DEPTH: DepthMode>(
     refused.total()
 }
 
-/// As [`evaluate`], of one steep Gaussian in `blocks`: exponents are formed in binary64.
+/// Composites one steep Gaussian in `blocks`, its exponents formed in binary64; returns the number of pixels that
+/// accepted it.
 #[inline(always)]
 pub(super) fn evaluate_steep<S: Simd, const DEPTH: DepthMode>(
     accumulator: &mut Accumulator,
@@ -419,8 +421,8 @@ fn keep<S: Simd>(accumulator: &mut Accumulator, block: usize, pixels: Pixels<S>)
 
 /// Composites a Gaussian of a colour and a depth in a block; returns which pixels it does not finish.
 ///
-/// What does not reach a pixel is composited with an alpha of zero, which changes nothing: to leave it out would take
-/// longer.
+/// A Gaussian that does not reach a pixel is composited with an alpha of zero, which changes nothing: to leave it out
+/// would take longer.
 #[inline(always)]
 fn composite_one<S: Simd>(
     accumulator: &mut Accumulator,
@@ -471,7 +473,7 @@ fn composite_one<S: Simd>(
 }
 
 impl<S: Simd> Pixels<S> {
-    /// What a Gaussian of so much alpha does. What is left is rounded once, where processors can.
+    /// The effect of a Gaussian of so much alpha. The transmittance behind it is rounded once, where processors can.
     #[inline(always)]
     fn pass(&self, alpha: f32x16<S>) -> Passed<S> {
         let t = self.transmittance;
@@ -498,10 +500,10 @@ impl<S: Simd> Pixels<S> {
     }
 }
 
-/// How far a Gaussian's alpha has fallen at a block's pixels, formed in binary64: minus its base-2 logarithm, but no less
+/// The fall of a Gaussian's alpha at a block's pixels, formed in binary64: minus its base-2 logarithm, but no less
 /// than -1, which is more than any ceiling, and still a power that is formed.
 ///
-/// What is wider than the period of a panorama counts where it is nearer than its copies.
+/// A Gaussian wider than the period of a panorama counts where it is nearer than its copies.
 #[inline(always)]
 pub(super) fn falls_64<S: Simd>(
     simd: S,

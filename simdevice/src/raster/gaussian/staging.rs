@@ -9,13 +9,13 @@ use crate::gaussian::splat::{Splat, SplatLook};
 use crate::stats::optimizations::Optimization;
 use fearless_simd::{Simd, f32x8, f32x16, f64x4, i32x16, mask32x16, prelude::*, u32x16};
 
-/// What rounding may do to exponents, relative to them.
+/// A bound of rounding's effect on exponents, relative to them.
 const ROOM_FACTOR: f32 = 1.0 + 1e-5;
 
 /// The Gaussians of a round that may reach each block: a bit for each.
 pub(super) type Reaching = [u32; BLOCKS];
 
-/// The same while they are found: the bits of eight Gaussians a byte.
+/// The Gaussians of a round that may reach each block, while they are found: the bits of eight a byte.
 type ReachingBytes = [[u8; ROUND / 8]; BLOCKS];
 
 /// A round's Gaussians in a tile.
@@ -26,9 +26,9 @@ pub(super) struct StagedRound {
     u: [[f32; PLACES]; BLOCKS_ACROSS],
     /// `v` at the middle of each block, by block and then by Gaussian.
     v: [[f32; PLACES]; BLOCKS],
-    /// By pair of columns of blocks, then by Gaussian, then by column of the pair: `u^2` less the logarithm of the opacity at
-    /// the pixels of two rows of a block. Its other two rows have the same. As are `along` and `looks`, it is there for Gaussians
-    /// that may reach a block.
+    /// By pair of columns of blocks, then by Gaussian, then by column of the pair: `u^2` less the logarithm of the
+    /// opacity at the pixels of two rows of a block. Its other two rows have the same. As are `along` and `looks`, it
+    /// is there for Gaussians that may reach a block.
     from_u: [[[f32; BLOCK_PIXELS / 2]; 2 * PLACES]; BLOCKS_ACROSS / 2],
     /// By Gaussian, the addition of a pixel's offset from the middle of its block to `v` there.
     along: [[f32; BLOCK_PIXELS]; PLACES],
@@ -93,8 +93,8 @@ pub(super) struct Placed {
 }
 
 impl StagedRound {
-    /// Places the Gaussians of a tile's round from number `from` on, before one that is steep, and has as many of the next round
-    /// on their way, which are then `ahead`. `open` are the blocks that are not finished.
+    /// Places the Gaussians of a tile's round from number `from` on, before one that is steep, and has as many of the
+    /// next round on their way, which are then `ahead`. `open` are the blocks that are not finished.
     #[inline(never)]
     pub(super) fn place<'a, S: Simd, const DEPTH: DepthMode>(
         &mut self,
@@ -217,8 +217,8 @@ impl StagedRound {
         along.store_slice(&mut self.along[number]);
     }
 
-    /// Finds `u` and `v` of the Gaussians from number `first` on, as many as a vector has lanes, and which blocks each may
-    /// reach.
+    /// Finds `u` and `v` of the Gaussians from number `first` on, as many as a vector has lanes, and which blocks each
+    /// may reach.
     #[inline(always)]
     fn find_blocks<S: Simd>(
         &mut self,
@@ -339,7 +339,7 @@ impl<S: Simd> Wide<S> {
         Self(self.0 + other.0, self.1 + other.1)
     }
 
-    /// How far it is from each number to `place`.
+    /// The distance from each number to `place`.
     #[inline(always)]
     fn distance_to(self, simd: S, place: f64) -> Self {
         let place = S::f64s::splat(simd, place);
@@ -381,7 +381,7 @@ pub(super) fn reached_blocks<S: Simd>(
     least.simd_le(room.combine(room))
 }
 
-/// Of the `open` blocks of a tile, those that a Gaussian would be evaluated in if depths did not hide it.
+/// The number of `open` blocks of a tile in which a Gaussian would be evaluated if depths did not hide it.
 #[inline(always)]
 pub(super) fn hidden_blocks<S: Simd>(
     simd: S,
