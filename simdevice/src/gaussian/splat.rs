@@ -23,27 +23,33 @@ pub(crate) struct Splat {
     pub factor: [f64; 3],
     /// The base-2 logarithm of the opacity.
     pub log2_opacity: f32,
-    /// Red, green, blue.
-    pub color: [f32; 3],
-    /// The centre's depth in the encoding of the depth attachment, if the draw tests or writes depth.
-    pub depth: u32,
-    /// True if its exponent is a difference of numbers so large that binary32 would lose its digits.
+    pub look: SplatLook,
+    /// True if its exponent is a difference of numbers so large that binary32 would lose it.
     pub needs_f64: bool,
-    /// True if it is wider than the period of a panorama. It then counts only within half a period of its mean, and its
-    /// copies elsewhere. `needs_f64` is then also true.
+    /// True if it is wider than the period of a panorama: it then counts within half a period of its mean only, where
+    /// its copies do not. Such a one is steep.
     pub exceeds_period: bool,
 }
 
+/// A splat's colour and depth: what compositing takes besides its alphas. They are copied as one vector.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(C, align(16))]
+pub(crate) struct SplatLook {
+    /// Red, green, blue.
+    pub color: [f32; 3],
+    /// The centre's depth as the depth attachment holds it, if the draw tests or writes depth.
+    pub depth: u32,
+}
+
 impl Splat {
-    /// The splat of an element of `flat`.
+    /// The splat of lane `at` of a group, with its colour and its centre's depth.
     #[inline(always)]
     pub(super) fn new(flat: &ScreenGaussians, at: usize, color: [f32; 3], depth: u32) -> Self {
         Self {
             mean: [flat.mean[0][at], flat.mean[1][at]],
             factor: [flat.factor[0][at], flat.factor[1][at], flat.factor[2][at]],
             log2_opacity: flat.log2_opacity[at] as f32,
-            color,
-            depth,
+            look: SplatLook { color, depth },
             needs_f64: flat.steep.has(at),
             exceeds_period: false,
         }

@@ -126,8 +126,9 @@ fn copy_layer(
         )
     });
     let size = u64::from(x.count) * texel_size;
-    // The offset in the memory of a row of a slice of the region; `None` if it overflows or lies outside the buffer.
-    let buffer_offset = |row: u32, slice: u32| {
+    // The offset of `size` bytes from a row's first copied texel on, in the buffer's memory; `None` if that overflows
+    // or lies outside the buffer.
+    let buffer_offset = |row: u32, slice: u32, size: u64| {
         let slice = u64::from(index)
             .checked_mul(depth.into())?
             .checked_add(u64::from(z.skipped) + u64::from(slice))?;
@@ -141,34 +142,54 @@ fn copy_layer(
         within(&copy.buffer, offset, size)
     };
     let (image, buffer) = (&copy.image, &copy.buffer.memory);
-    // Returns true if the row was copied.
-    let copy_row = |number: usize| {
-        let rows = y.count as usize;
-        let (slice, row) = ((number / rows) as u32, (number % rows) as u32);
+    // Copies `count` rows of a slice, which follow one another without a gap. Returns false if they do not fit the
+    // buffer.
+    let copy_rows = |row: u32, slice: u32, count: u32| {
+        let all = size * u64::from(count);
         let at = [x.first, y.first + row, z.first + slice];
-        let copied = buffer_offset(row, slice)
+        let copied = buffer_offset(row, slice, all)
             .zip(image.row(layout, at, size))
             .map(|(in_buffer, in_image)| match direction {
-                Direction::ToImage => image.memory.copy_from(in_image, buffer, in_buffer, size),
-                Direction::ToBuffer => buffer.copy_from(in_buffer, &image.memory, in_image, size),
+                Direction::ToImage => image.memory.copy_from(in_image, buffer, in_buffer, all),
+                Direction::ToBuffer => buffer.copy_from(in_buffer, &image.memory, in_image, all),
             });
         matches!(copied, Some(Ok(())))
     };
-    let rows = y.count as usize * z.count as usize;
-    // If rows overlap, or the buffer overlaps the image, the order of rows matters.
+    // Rows that overlap in the buffer, or an image that does, keep their order.
     let are_apart = row_length >= width.into()
         && image_height >= height.into()
         && !Arc::ptr_eq(&image.memory, buffer);
     let threads = runtime.threads();
+    let rows = y.count as usize * z.count as usize;
     let bytes = size.saturating_mul(rows as u64);
-    let is_whole = if are_apart && threads > 1 && bytes >= LEAST_SHARED {
-        let least = rows.div_ceil(4 * threads);
+    let is_shared = are_apart && threads > 1 && bytes >= LEAST_SHARED;
+    let least = if is_shared {
+        rows.div_ceil(4 * threads)
+    } else {
+        rows
+    };
+    // Rows that follow one another without a gap, both in the image and in the buffer, are copied at once.
+    let is_dense = are_apart && size == layout.row_pitch && u64::from(x.count) == row_length;
+    let in_slice = y.count.max(1) as usize;
+    let run = if is_dense {
+        least.clamp(1, in_slice)
+    } else {
+        1
+    };
+    let runs = in_slice.div_ceil(run);
+    let copy_run = |number: usize| {
+        let (slice, row) = ((number / runs) as u32, number % runs * run);
+        let (row, end) = (row as u32, (row + run).min(in_slice) as u32);
+        copy_rows(row, slice, end - row) || (row..end).all(|row| copy_rows(row, slice, 1))
+    };
+    let count = if rows > 0 { runs * z.count as usize } else { 0 };
+    let is_whole = if is_shared {
         runtime.install(|| {
-            let numbers = (0..rows).into_par_iter();
-            numbers.with_min_len(least).all(copy_row)
+            let numbers = (0..count).into_par_iter();
+            numbers.with_min_len(least.div_ceil(run)).all(copy_run)
         })
     } else {
-        (0..rows).all(copy_row)
+        (0..count).all(copy_run)
     };
     if !is_whole {
         log::warn!("left out rows that lie outside the buffer: {region:?}");

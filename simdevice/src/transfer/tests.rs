@@ -322,12 +322,19 @@ fn runtime(threads: usize) -> Runtime {
 
 #[test]
 fn workers_copy_what_one_thread_does() {
-    const SIZE: [u32; 2] = [700, 500];
-    let image = image(ImageKind::D2, Format::R32Uint, [SIZE[0], SIZE[1], 1], 1);
-    // Rows with gaps, contiguous rows, and overlapping rows, of which the last one counts.
-    for row_length in [SIZE[0] + 9, 0, SIZE[0] - 300] {
-        let stride = if row_length == 0 { SIZE[0] } else { row_length };
-        let texels = stride * SIZE[1] + SIZE[0];
+    // The image's rows follow one another without a gap, or do not.
+    for width in [700, 704] {
+        workers_copy_rows_of(width);
+    }
+}
+
+fn workers_copy_rows_of(width: u32) {
+    let size = [width, 500];
+    let image = image(ImageKind::D2, Format::R32Uint, [size[0], size[1], 1], 1);
+    // Rows that are apart, that follow one another, and that overlap, of which the last one counts.
+    for row_length in [size[0] + 9, 0, size[0] - 300] {
+        let stride = if row_length == 0 { size[0] } else { row_length };
+        let texels = stride * size[1] + size[0];
         let texel = |at: u32| at.wrapping_mul(0x9E37_79B9);
         let words: Vec<u32> = (0..texels).map(texel).collect();
         let source = buffer(bytemuck::cast_slice(&words));
@@ -337,7 +344,7 @@ fn workers_copy_what_one_thread_does() {
             buffer_image_height: 0,
             subresource: color(0, 1),
             image_offset: [0; 3],
-            image_extent: [SIZE[0], SIZE[1], 1],
+            image_extent: [size[0], size[1], 1],
         };
         let copy = |buffer: &BufferRange, direction, threads| {
             let copy = CopyBufferImage {
@@ -354,10 +361,75 @@ fn workers_copy_what_one_thread_does() {
             contents(&out)
         });
         assert!(alone == shared, "rows of {stride}");
-        for at in [0, 1, stride, stride * (SIZE[1] - 1) + SIZE[0] - 1] {
+        for at in [0, 1, stride, stride * (size[1] - 1) + size[0] - 1] {
             let at = at as usize + 2;
             let written = &shared[4 * at..4 * at + 4];
             assert_eq!(written, words[at].to_le_bytes(), "{at}, rows of {stride}");
+        }
+    }
+}
+
+#[test]
+fn of_rows_without_a_gap_those_are_copied_that_fit_the_buffer() {
+    let image = image(ImageKind::D2, Format::R32Uint, [64, 8, 1], 1);
+    let words: Vec<u32> = (0..64 * 8).map(|at| at + 1).collect();
+    let mut range = buffer(bytemuck::cast_slice(&words));
+    // The last row lacks a byte.
+    range.size -= 1;
+    let region = BufferImageRegion {
+        buffer_offset: 0,
+        buffer_row_length: 0,
+        buffer_image_height: 0,
+        subresource: color(0, 1),
+        image_offset: [0; 3],
+        image_extent: [64, 8, 1],
+    };
+    let copy = CopyBufferImage {
+        buffer: range,
+        image: image.clone(),
+        regions: vec![region],
+    };
+    copy_buffer_image(&copy, Direction::ToImage, &runtime(1));
+    let mut copied = vec![0u32; 64 * 8];
+    image.memory.read(0, &mut copied).unwrap();
+    assert_eq!(copied[..64 * 7], words[..64 * 7]);
+    assert_eq!(copied[64 * 7..], [0; 64]);
+}
+
+#[test]
+fn images_without_gaps_are_copied_as_others_are() {
+    for width in [60, 64] {
+        let [source, target] =
+            [(); 2].map(|()| image(ImageKind::D2, Format::R32Uint, [width, 8, 1], 1));
+        let layout = source.subresource(Aspect::Color, 0, 0).unwrap();
+        let row_of = |y: u32| (0..width).map(move |x| 1000 * (y + 1) + x);
+        for y in 0..8 {
+            let row: Vec<u32> = row_of(y).collect();
+            source
+                .write_row(&layout, [0, y, 0], bytemuck::cast_slice(&row))
+                .unwrap();
+        }
+        let region = ImageCopyRegion {
+            source: color(0, 1),
+            source_offset: [0, 1, 0],
+            target: color(0, 1),
+            target_offset: [0, 3, 0],
+            extent: [width, 4, 1],
+        };
+        copy_image(&CopyImage {
+            source,
+            target: target.clone(),
+            regions: vec![region],
+        });
+        for y in 0..8 {
+            let mut row = vec![0u32; width as usize];
+            let bytes = bytemuck::cast_slice_mut(&mut row);
+            target.read_row(&layout, [0, y, 0], bytes).unwrap();
+            let expected: Vec<u32> = match y {
+                3..7 => row_of(y - 2).collect(),
+                _ => vec![0; width as usize],
+            };
+            assert_eq!(row, expected, "row {y} of {width}");
         }
     }
 }

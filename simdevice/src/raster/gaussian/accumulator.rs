@@ -1,4 +1,4 @@
-//! What Gaussian mode accumulates for a tile's pixels, or for one sample of each.
+//! The accumulators of Gaussian mode for a tile's pixels, or for one sample of each.
 
 use super::grid::{ALL_LANES, BLOCK_PIXELS, BLOCKS, PixelMask, TILE, block_and_lane};
 use crate::format::depth::DepthEncoding;
@@ -23,11 +23,11 @@ pub(super) struct Accumulator {
     pub(super) means: [[[f32; BLOCK_PIXELS]; BLOCKS]; 2],
 }
 
-/// What no accumulator leaves anything of, neither more nor less than a floor.
+/// The transmittance of a pixel that is not to be touched: nothing is left of it, and it is below every floor.
 const UNTOUCHED: f32 = f32::NEG_INFINITY;
 
-/// A transmittance that is compared with pixels': its bits, which as integers are in the order of what they stand for, and
-/// less than zero where a pixel is finished.
+/// A transmittance that is compared with pixels': its bits, which as integers are in the order of what they stand for,
+/// and less than zero where a pixel is finished.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct TransmittanceBits(i32);
 
@@ -133,8 +133,8 @@ impl Accumulator {
         open
     }
 
-    /// Finds the pixels that some Gaussian contributed to, from what it left of their transmittance: no alpha is so small that
-    /// it leaves that as it was, since low floors are for wider sums.
+    /// Finds the pixels that some Gaussian contributed to, from what it left of their transmittance: no alpha is so
+    /// small that it leaves that as it was, since low floors are for wider sums.
     #[inline(always)]
     pub(super) fn find_covered<S: Simd>(&mut self, simd: S) {
         for (covered, lanes) in self.covered.iter_mut().zip(&self.transmittance) {
@@ -143,7 +143,7 @@ impl Accumulator {
         }
     }
 
-    /// How many rows have a pixel that is not finished.
+    /// The number of rows with a pixel that is not finished.
     pub(super) fn open_rows(&self) -> u8 {
         let open = |&y: &usize| {
             (0..TILE).any(|x| {
@@ -165,7 +165,8 @@ impl Accumulator {
         finished
     }
 
-    /// Finds how far alphas may fall at a block's pixels: no farther than `most_fall`, and where they are finished, not at all.
+    /// Finds how far alphas may fall at a block's pixels: no farther than `most_fall`, and where they are finished, not
+    /// at all.
     #[inline(always)]
     pub(super) fn find_most_fall<S: Simd>(&mut self, simd: S, block: usize, most_fall: f32) {
         let t = f32x16::from_slice(simd, &self.transmittance[block]);

@@ -1,8 +1,8 @@
 //! binary16 rasterization: every operation of a processing element is rounded to binary16.
 //!
-//! Numbers are held as binary32. Sums and products of binary16 numbers, rounded to binary32 and from there to binary16, are
-//! what a binary16 unit gives. The mean and the pixel meet before, in binary64: their difference is what an element is
-//! given, rounded. Powers of two come from the polynomial of binary32, unfused, rounded. Nothing depends on the SIMD
+//! Numbers are held as binary32. Sums and products of binary16 numbers, rounded to binary32 and from there to binary16,
+//! are what a binary16 unit gives. The mean and the pixel meet before, in binary64: their difference is what an element
+//! is given, rounded. Powers of two come from the polynomial of binary32, unfused, rounded. Nothing depends on the SIMD
 //! level, and [`scalar`] says the same without vectors.
 
 use super::accumulator::Accumulator;
@@ -10,7 +10,7 @@ use super::block_lists::BlockKernel;
 use super::depth_ranges::DepthRanges;
 use super::grid::{BLOCK_X, BLOCK_Y, LANE_X_64, LANE_Y_64};
 use super::inputs::{FIND_MEDIAN, NO_DEPTH, Thresholds, TileInputs};
-use crate::gaussian::splat::Splat;
+use crate::gaussian::splat::{Splat, SplatLook};
 use crate::simd::exp2::POWER_OF_TWO;
 use crate::simd::{bits_of, floats_of};
 use fearless_simd::{Simd, f32x16, f64x8, mask32x16, prelude::*, u32x16};
@@ -82,14 +82,17 @@ impl BlockKernel for Half {
         let shown = if thresholds.depth_mode <= NO_DEPTH {
             mask32x16::splat(simd, true)
         } else {
-            ranges.pixels(simd, block, splat.depth)
+            ranges.pixels(simd, block, splat.look.depth)
         };
-        let look = (rounded.color, splat.depth);
+        let look = SplatLook {
+            color: rounded.color,
+            depth: splat.look.depth,
+        };
         accumulate(accumulator, simd, block, alpha, shown, look, thresholds)
     }
 }
 
-/// How far a block's pixels are from a Gaussian's mean, rounded.
+/// The offsets of a block's pixels from a Gaussian's mean, rounded.
 #[inline(always)]
 fn offsets<S: Simd>(simd: S, splat: &Splat, corner: [u32; 2], block: usize) -> [f32x16<S>; 2] {
     let middle = |axis: usize, block: f64| block + (f64::from(corner[axis]) - splat.mean[axis]);
@@ -121,7 +124,7 @@ fn accumulate<S: Simd>(
     block: usize,
     alpha: f32x16<S>,
     shown: mask32x16<S>,
-    (color, depth): ([f32; 3], u32),
+    SplatLook { color, depth }: SplatLook,
     thresholds: Thresholds,
 ) -> u64 {
     let zero = f32x16::splat(simd, 0.0);
@@ -149,7 +152,7 @@ fn accumulate<S: Simd>(
     u64::from(accepted.count_ones())
 }
 
-/// What an element is given of a draw.
+/// The constants of a draw, as an element has them.
 fn rounded(thresholds: &Thresholds) -> Thresholds {
     Thresholds {
         alpha_floor: scalar::round(thresholds.alpha_floor),
@@ -159,7 +162,7 @@ fn rounded(thresholds: &Thresholds) -> Thresholds {
     }
 }
 
-/// What binary16 rasterization is, one number at a time.
+/// The definition of binary16 rasterization, one number at a time.
 pub(super) mod scalar {
     use crate::gaussian::splat::Splat;
 
@@ -183,7 +186,7 @@ pub(super) mod scalar {
     /// The greatest binary16 number.
     const GREATEST: f32 = 65504.0;
 
-    /// What an element is given of a Gaussian.
+    /// The numbers of a Gaussian, as an element has them.
     #[derive(Clone, Copy, Debug)]
     pub(in super::super) struct Splat16 {
         pub(super) factor: [f32; 3],
@@ -197,7 +200,10 @@ pub(super) mod scalar {
                 factor: splat.factor.map(|f| round(f as f32)),
                 log2_opacity: round(splat.log2_opacity),
                 // An infinite colour times a weight that underflows would be no number.
-                color: splat.color.map(|c| round(c).clamp(-GREATEST, GREATEST)),
+                color: splat
+                    .look
+                    .color
+                    .map(|c| round(c).clamp(-GREATEST, GREATEST)),
             }
         }
     }
@@ -205,7 +211,7 @@ pub(super) mod scalar {
     #[cfg(test)]
     pub(in super::super) use definition::*;
 
-    /// What vectors are tested against.
+    /// The definition that vectors are tested against.
     #[cfg(test)]
     mod definition {
         use super::{Splat16, round};
@@ -222,7 +228,7 @@ pub(super) mod scalar {
             ))
         }
 
-        /// What an element is given of the draw.
+        /// The constants of the draw, as an element has them.
         #[derive(Clone, Copy, Debug)]
         pub(crate) struct State {
             pub(crate) alpha_floor: f32,
@@ -253,7 +259,7 @@ pub(super) mod scalar {
             exp2(exponent).min(state.alpha_ceiling)
         }
 
-        /// What an element accumulates.
+        /// The sums of an element.
         #[derive(Clone, Copy, Debug)]
         pub(crate) struct Pixel {
             pub(crate) color: [f32; 3],

@@ -12,7 +12,7 @@ use crate::stats::recorder::Run;
 use devmem::host;
 use fearless_simd::{Simd, mask32x16, prelude::*};
 
-/// What may reach each block, in the order of the tile's list.
+/// The Gaussians that may reach each block, in the order of the tile's list.
 pub(super) type BlockLists = [Vec<u32>; BLOCKS];
 
 /// A kernel that composites a block's list, one Gaussian after the other.
@@ -68,7 +68,7 @@ pub(super) fn composite_by_block<S: Simd, K: BlockKernel>(
     work
 }
 
-/// How far alpha may fall in exact arithmetic where binary16 does not put it below `most_fall`.
+/// The greatest fall of alpha in exact arithmetic where binary16 does not put it below `most_fall`.
 fn half_most_fall(splat: &Splat, most_fall: f32) -> f32 {
     let opacity = f64::from(splat.log2_opacity);
     (binary16_headroom(splat.factor, opacity + f64::from(most_fall)) - opacity) as f32
@@ -98,7 +98,7 @@ pub(super) fn part<S: Simd>(
     for &primitive in task.list {
         let (batch, place) = locate(primitive);
         let splat = &task.splats[batch][place];
-        let hidden = tests_depth && ranges.hides(splat.depth);
+        let hidden = tests_depth && ranges.hides(splat.look.depth);
         if hidden {
             work.tiles_hidden += 1;
             if !recorded {
@@ -122,7 +122,7 @@ pub(super) fn part<S: Simd>(
             continue;
         }
         if tests_depth {
-            let shown = ranges.blocks(simd, splat.depth);
+            let shown = ranges.blocks(simd, splat.look.depth);
             work.blocks_hidden += u64::from((reached & !shown).to_bitmask().count_ones());
             reached &= shown;
         }

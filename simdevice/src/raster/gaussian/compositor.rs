@@ -1,9 +1,10 @@
 //! Gaussian mode of the tile engine: front to back through a tile's list, with early termination.
 //!
-//! Most trained Gaussians are a few pixels wide, so a tile is taken as 16 blocks of 4x4 pixels, and lists are
-//! worked off in three phases, a round at a time. Phase 1 ([`staging`]) tests a vector of Gaussians against each of the 16 blocks,
-//! conservatively, and sets their bits in the words of those that they may reach. Phase 2 ([`pixels`]) finds the alphas of all
-//! that are reached, and phase 3 takes the blocks in turn, each with its 16 pixels in registers, through their alphas.
+//! Most trained Gaussians are a few pixels wide, so a tile is taken as 16 blocks of 4x4 pixels, and lists are worked
+//! off in three phases, a round at a time. Phase 1 ([`staging`]) tests a vector of Gaussians against each of the 16
+//! blocks, conservatively, and sets their bits in the words of those that they may reach. Phase 2 ([`pixels`]) finds
+//! the alphas of all that are reached, and phase 3 takes the blocks in turn, each with its 16 pixels in registers,
+//! through their alphas.
 //!
 //! Exponents are formed from the block's middle: the Cholesky factor times its offset from the mean is computed in
 //! binary64 and rounded once, and from there pixels are at most 1.5 away in x and y. Needles that cross many tiles
@@ -55,7 +56,7 @@ pub struct GaussianTile {
     pub(super) accumulators: [Accumulator; ACCUMULATORS],
     pub(super) ranges: DepthRanges,
     fast: FastScratch,
-    /// Of the kernels that part lists by blocks.
+    /// The lists of the kernels that part lists by blocks.
     lists: BlockLists,
     per_pixel: PerPixel,
     /// By accumulator, what a fragment program reads of Gaussians, if it does.
@@ -165,7 +166,7 @@ impl GaussianTile {
         counters.add(Counter::PixelContributions, work.contributions);
     }
 
-    /// Makes what is tracked of an accumulator's pixels fresh.
+    /// Resets what is tracked of an accumulator's pixels.
     fn clear_tracked(&mut self, accumulator: usize) {
         if self.tracked.len() <= accumulator {
             host::resize(&mut self.tracked, accumulator + 1, Tracked::EMPTY);
@@ -173,7 +174,8 @@ impl GaussianTile {
         self.tracked[accumulator] = Tracked::EMPTY;
     }
 
-    /// Which of `lanes` some Gaussian of `draw` reaches with an alpha of the floor or more, whatever its depth.
+    /// The pixels of `lanes` that some Gaussian of `draw` reaches with an alpha of the floor or more, whatever its
+    /// depth.
     pub(super) fn reached(
         &mut self,
         draw: &BinnedDraw,
@@ -344,7 +346,7 @@ impl GaussianTile {
         self.sample(0, x, y)
     }
 
-    /// As [`GaussianTile::pixel`], of a accumulator.
+    /// Returns the same as [`GaussianTile::pixel`], of an accumulator.
     fn sample(&self, accumulator: usize, x: usize, y: usize) -> Option<[f32; 4]> {
         let accumulator = &self.accumulators[accumulator];
         let (block, lane) = block_and_lane(x, y);

@@ -1,4 +1,4 @@
-//! Which depths pass a draw's depth test, by pixel, block and tile.
+//! The depths that pass a draw's depth test, by pixel, block and tile.
 //!
 //! Whatever the comparison, what passes against a stored depth is a range of numbers, counted modulo 2^32: all but the
 //! stored depth are those from one more to one less. So one subtraction and one comparison do for every operation, and
@@ -92,13 +92,13 @@ impl DepthRanges {
         }
     }
 
-    /// Whether a depth fails in all of the tile.
+    /// True if a depth fails in all of the tile.
     #[inline(always)]
     pub(super) fn hides(&self, depth: u32) -> bool {
         depth < self.tile[0] || depth > self.tile[1]
     }
 
-    /// Whether a depth and all that follow it fail in all of the tile.
+    /// True if a depth and all that follow it fail in all of the tile.
     #[inline(always)]
     pub(super) fn rejects_rest(&self, depth: u32, trend: DepthTrend) -> bool {
         match trend {

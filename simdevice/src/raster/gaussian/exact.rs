@@ -3,9 +3,9 @@
 //!
 //! Sums are in binary64 for draws whose floors let more accumulators be seen through each other than the usual ones do.
 //!
-//! Each accumulator rounds the transmittance and the colour of a pixel. With the usual floors a pixel ends before that is
-//! worth much; without them errors of thousands of accumulators add up beyond the contract. A block's whole list is worked off
-//! at once here, so that its sums stay at hand and are rounded to binary32 only in the end.
+//! Each accumulator rounds the transmittance and the colour of a pixel. With the usual floors a pixel ends before that
+//! is worth much; without them errors of thousands of accumulators add up beyond the contract. A block's whole list is
+//! worked off at once here, so that its sums stay at hand and are rounded to binary32 only in the end.
 
 use super::accumulator::Accumulator;
 use super::block_lists::BlockKernel;
@@ -13,10 +13,11 @@ use super::depth_ranges::DepthRanges;
 use super::grid::{BLOCK_PIXELS, BLOCK_X, BLOCK_Y, LANE_X_64, LANE_Y_64};
 use super::inputs::{FIND_MEAN, FIND_MEDIAN, Kernel, NO_DEPTH, Thresholds, TileInputs};
 use super::pixels::{accumulate, falls_64};
+use crate::gaussian::splat::SplatLook;
 use crate::simd::exp2::exp2_of_negated;
 use fearless_simd::{Simd, f32x16, f64x8, mask32x16, mask64x8, prelude::*};
 
-/// What the pixels of a block accumulate; signs of transmittances as in [`Accumulator`].
+/// The sums of a block's pixels; signs of transmittances as in [`Accumulator`].
 #[derive(Clone, Copy)]
 #[repr(align(64))]
 struct Sums {
@@ -39,7 +40,7 @@ impl Sums {
         accumulator.transmittance[block] = self.transmittance.map(|t| t as f32);
     }
 
-    /// Whether a pixel is not finished.
+    /// True if a pixel is not finished.
     fn is_open(&self) -> bool {
         self.transmittance.iter().any(|t| t.is_sign_positive())
     }
@@ -61,7 +62,7 @@ impl Sums {
         (low.0.narrow(high.0), low.1 | high.1)
     }
 
-    /// As [`Sums::add`], in half of the lanes.
+    /// Does what [`Sums::add`] does, in half of the lanes.
     #[inline(always)]
     fn add_half<S: Simd>(
         &mut self,
@@ -107,7 +108,7 @@ impl BlockKernel for InOrder {
     ) -> u64 {
         let splat = &task.splats[batch][place];
         let fall = falls(simd, task, (batch, place), block);
-        let look = (splat.color, splat.depth);
+        let look = splat.look;
         accumulate(
             accumulator,
             simd,
@@ -155,7 +156,7 @@ impl BlockKernel for WideSums {
     ) -> u64 {
         let splat = &task.splats[batch][place];
         let fall = falls(simd, task, (batch, place), block);
-        let look = (splat.color, splat.depth);
+        let look = splat.look;
         let to = (block, &mut self.0);
         accumulate_wide(accumulator, simd, to, fall, look, ranges, task.thresholds)
     }
@@ -166,14 +167,14 @@ impl BlockKernel for WideSums {
     }
 }
 
-/// As [`accumulate`], to sums that are kept elsewhere.
+/// Does what [`accumulate`] does, to sums that are kept elsewhere.
 #[inline(always)]
 fn accumulate_wide<S: Simd>(
     accumulator: &mut Accumulator,
     simd: S,
     (block, sums): (usize, &mut Sums),
     fall: f32x16<S>,
-    (color, depth): ([f32; 3], u32),
+    SplatLook { color, depth }: SplatLook,
     ranges: &DepthRanges,
     thresholds: Thresholds,
 ) -> u64 {
@@ -207,10 +208,10 @@ fn accumulate_wide<S: Simd>(
     u64::from(accepted.count_ones())
 }
 
-/// How far alpha has fallen where a Gaussian is cut off: farther than any contributes.
+/// The fall of an alpha where a Gaussian is cut off: greater than that of any that contributes.
 const CUT: f32 = 1e3;
 
-/// How far a primitive's alpha has fallen at a block's pixels.
+/// The fall of a primitive's alpha at a block's pixels: minus its base-2 logarithm.
 #[inline(always)]
 pub(super) fn falls<S: Simd>(
     simd: S,

@@ -1,6 +1,6 @@
-//! The fast kernel: volumes in the order of a tile's list, a round of 32 after the other. Each round is staged ([`staging`]):
-//! what the others need of its Gaussians, and which blocks each may reach. Then the alphas of all that are reached are found,
-//! and then blended, block by block ([`pixels`]).
+//! The fast kernel: volumes in the order of a tile's list, a round of 32 after the other. Each round is staged
+//! ([`staging`]): what the others need of its Gaussians, and which blocks each may reach. Then the alphas of all that
+//! are reached are found, and then blended, block by block ([`pixels`]).
 //!
 //! [`staging`]: super::staging
 //! [`pixels`]: super::pixels
@@ -10,14 +10,14 @@ use super::depth_ranges::DepthRanges;
 use super::grid::{ALL_BLOCKS, BLOCKS, ROUND};
 use super::inputs::{DepthMode, NO_DEPTH, TileCounts, TileInputs};
 use super::pixels::{Alphas, evaluate, evaluate_steep};
-use super::staging::{Reaching, StagedRound, hidden_blocks};
+use super::staging::{StagedRound, hidden_blocks};
 use crate::gaussian::splat::Splat;
 use crate::stats::optimizations::Optimization;
 use crate::stats::recorder;
 use crate::stats::recorder::Run;
 use fearless_simd::{Simd, mask32x16, prelude::*};
 
-/// What the kernel needs besides the pixels.
+/// The kernel's scratch besides the pixels.
 #[derive(Debug, Default)]
 pub(super) struct FastScratch {
     staged: StagedRound,
@@ -30,7 +30,7 @@ pub(super) struct FastScratch {
 struct Open {
     /// A bit for each.
     bits: u64,
-    /// How many they are.
+    /// The number of them.
     blocks: u8,
     /// Rows of pixels with an unfinished one, if work is recorded.
     rows: u8,
@@ -39,7 +39,7 @@ struct Open {
 /// Gaussians that are composited together.
 struct Round<'a> {
     splats: &'a [&'a Splat],
-    /// Those of the round after.
+    /// The primitives of the round after.
     next: &'a [u32],
     open: Open,
     is_recorded: bool,
@@ -65,11 +65,16 @@ pub(super) fn composite<S: Simd, const DEPTH: DepthMode>(
     for (splat, &primitive) in ahead.iter_mut().zip(task.list) {
         *splat = task.prefetched(primitive);
     }
+    // The open blocks stay the same until a pixel is finished, unless blocks are left out for the light that they have.
+    let mut known = None;
     for (number, primitives) in task.list.chunks(ROUND).enumerate() {
         let round = ahead;
         let splats = &round[..primitives.len().min(ROUND)];
         let rest = &task.list[number * ROUND..];
-        let bits = open_blocks::<_, DEPTH>(simd, task, accumulator, rest, &mut work);
+        let bits = match known {
+            Some(bits) if task.way.light == NOT_TERMINATED => bits,
+            _ => open_blocks::<_, DEPTH>(simd, task, accumulator, rest, &mut work),
+        };
         if bits == 0 {
             break;
         }
@@ -82,7 +87,7 @@ pub(super) fn composite<S: Simd, const DEPTH: DepthMode>(
                 0
             },
         };
-        if DEPTH > NO_DEPTH && ranges.rejects_rest(splats[0].depth, task.trend) {
+        if DEPTH > NO_DEPTH && ranges.rejects_rest(splats[0].look.depth, task.trend) {
             work.tiles_hidden += rest.len() as u64;
             if let Some(runs) = &mut runs {
                 work.hidden_rest = rest.len() as u32;
@@ -98,7 +103,7 @@ pub(super) fn composite<S: Simd, const DEPTH: DepthMode>(
             open,
             is_recorded: runs.is_some(),
         };
-        let blocks_of_hidden = composite_round::<_, DEPTH>(
+        let outcome = composite_round::<_, DEPTH>(
             scratch,
             simd,
             task,
@@ -106,6 +111,7 @@ pub(super) fn composite<S: Simd, const DEPTH: DepthMode>(
             (&round, &mut ahead),
             &mut work,
         );
+        known = (!outcome.may_have_finished).then_some(bits);
         if let Some(runs) = &mut runs {
             let run = Run {
                 primitives: splats.len() as u32,
@@ -113,7 +119,7 @@ pub(super) fn composite<S: Simd, const DEPTH: DepthMode>(
                 blocks: open.blocks,
                 reached: (work.items - before.items) as u32,
                 hidden: (work.tiles_hidden - before.tiles_hidden) as u32,
-                hidden_blocks: blocks_of_hidden
+                hidden_blocks: outcome.blocks_of_hidden
                     + (work.blocks_hidden - before.blocks_hidden) as u32,
             };
             recorder::push_run(runs, run);
@@ -123,8 +129,8 @@ pub(super) fn composite<S: Simd, const DEPTH: DepthMode>(
     work
 }
 
-/// The blocks that are not finished, a bit for each, before the `rest` of a list. Counts those that are left out since they
-/// have too little light.
+/// The blocks that are not finished, a bit for each, before the `rest` of a list. Counts those that are left out since
+/// they have too little light.
 #[inline(always)]
 fn open_blocks<S: Simd, const DEPTH: DepthMode>(
     simd: S,
@@ -150,7 +156,15 @@ fn open_blocks<S: Simd, const DEPTH: DepthMode>(
     open
 }
 
-/// Composites a round, and brings the next one's splats `ahead`. Returns how many blocks those would reach that depths hide in all of the tile, if work is recorded.
+/// The outcome of a round, besides its account.
+struct RoundOutcome {
+    /// Blocks that Gaussians would reach that depths hide in all of the tile, if work is recorded.
+    blocks_of_hidden: u32,
+    /// True if pixels may have been finished.
+    may_have_finished: bool,
+}
+
+/// Composites a round, and brings the next one's splats `ahead`.
 #[inline(always)]
 fn composite_round<'a, S: Simd, const DEPTH: DepthMode>(
     scratch: &mut FastScratch,
@@ -159,10 +173,14 @@ fn composite_round<'a, S: Simd, const DEPTH: DepthMode>(
     (accumulator, ranges): (&mut Accumulator, &DepthRanges),
     (round, ahead): (&Round<'_>, &mut [&'a Splat; ROUND]),
     work: &mut TileCounts,
-) -> u32 {
+) -> RoundOutcome {
     let (open, blocks) = (round.open.bits, u64::from(round.open.blocks));
-    let (mut blocks_of_hidden, mut from) = (0, 0);
-    let reaching = loop {
+    let mut outcome = RoundOutcome {
+        blocks_of_hidden: 0,
+        may_have_finished: false,
+    };
+    let mut from = 0;
+    loop {
         let placed = scratch.staged.place::<_, DEPTH>(
             simd,
             task,
@@ -174,14 +192,9 @@ fn composite_round<'a, S: Simd, const DEPTH: DepthMode>(
         work.open += placed.count * blocks;
         work.tiles_hidden += placed.tiles_hidden;
         work.blocks_hidden += placed.blocks_hidden;
-        blocks_of_hidden += placed.blocks_of_hidden;
-        let Some(&splat) = round.splats.get(placed.end) else {
-            break placed.reaching;
-        };
-        // It is steep; what is before it is composited first.
-        work.items += count_bits(&placed.reaching);
+        outcome.blocks_of_hidden += placed.blocks_of_hidden;
         let staged = (&scratch.staged, &mut *scratch.alphas);
-        work.contributions += evaluate::<_, DEPTH>(
+        let evaluated = evaluate::<_, DEPTH>(
             accumulator,
             simd,
             &placed.reaching,
@@ -189,10 +202,17 @@ fn composite_round<'a, S: Simd, const DEPTH: DepthMode>(
             ranges,
             task.thresholds,
         );
+        work.items += evaluated.items;
+        work.contributions += evaluated.contributions;
+        outcome.may_have_finished |= evaluated.may_have_finished;
+        let Some(&splat) = round.splats.get(placed.end) else {
+            break;
+        };
+        // It is steep; those before it were composited.
         let shown = if DEPTH <= NO_DEPTH {
             open
         } else {
-            open & ranges.blocks(simd, splat.depth).to_bitmask()
+            open & ranges.blocks(simd, splat.look.depth).to_bitmask()
         };
         let exact = u64::from(shown.count_ones());
         work.open += blocks;
@@ -200,23 +220,14 @@ fn composite_round<'a, S: Simd, const DEPTH: DepthMode>(
         work.items += exact;
         work.contributions +=
             evaluate_steep::<_, DEPTH>(accumulator, simd, splat, shown, ranges, task);
+        outcome.may_have_finished = true;
         from = placed.end + 1;
-    };
+    }
     work.pairs += round.splats.len() as u64;
-    work.items += count_bits(&reaching);
-    let staged = (&scratch.staged, &mut *scratch.alphas);
-    work.contributions += evaluate::<_, DEPTH>(
-        accumulator,
-        simd,
-        &reaching,
-        staged,
-        ranges,
-        task.thresholds,
-    );
-    blocks_of_hidden
+    outcome
 }
 
-/// What a trace tells of the Gaussians at a list's end that depths hide in all of the tile.
+/// The record in a trace of the Gaussians at a list's end that depths hide in all of the tile.
 #[inline(always)]
 fn hidden_run<S: Simd>(simd: S, task: &TileInputs<'_>, rest: &[u32], open: Open) -> Run {
     let mut run = Run {
@@ -231,12 +242,4 @@ fn hidden_run<S: Simd>(simd: S, task: &TileInputs<'_>, rest: &[u32], open: Open)
         run.hidden_blocks += hidden_blocks(simd, task.splat(primitive), task, open);
     }
     run
-}
-
-/// How many pairs of a block and a Gaussian there are.
-fn count_bits(reaching: &Reaching) -> u64 {
-    reaching
-        .iter()
-        .map(|bits| u64::from(bits.count_ones()))
-        .sum()
 }

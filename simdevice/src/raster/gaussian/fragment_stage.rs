@@ -1,8 +1,8 @@
 //! The resolve shader: a fragment program that makes the colours of a Gaussian draw's fragments from what was
 //! accumulated. It runs once for all samples of a pixel that accumulated alike, or for each sample if it asks for that.
 //!
-//! Blocks of 4x4 pixels are quads in the order of lanes, so a tile is one batch of a lane each. Lanes that are not covered
-//! help with derivatives: they hold what their own pixels accumulated.
+//! Blocks of 4x4 pixels are quads in the order of lanes, so a tile is one batch of a lane each. Lanes that are not
+//! covered help with derivatives: they hold what their own pixels accumulated.
 
 use super::compositor::GaussianTile;
 use super::grid::{BLOCK_PIXELS, BLOCK_X, BLOCK_Y, BLOCKS, LANE_X, LANE_Y, PixelMask};
@@ -43,7 +43,7 @@ pub(super) struct FragmentStageDraw<'a> {
     limit: Duration,
 }
 
-/// What a worker shades a tile with.
+/// The tools with which a worker shades a tile.
 pub(super) struct Tools<'a> {
     pub(super) buffers: &'a mut Buffers,
     pub(super) fragments: &'a GaussianTile,
@@ -84,17 +84,17 @@ impl<'a> FragmentStageDraw<'a> {
         }
     }
 
-    /// Whether the program reads depths.
+    /// True if the program reads depths.
     pub(super) fn reads_depth(&self) -> bool {
         self.shader.program.reads_depth
     }
 
-    /// Whether the program reads which Gaussians there are, or depth variables.
+    /// True if the program reads indices of Gaussians, or depth variables.
     pub(super) fn is_tracking(&self) -> bool {
         self.shader.program.is_tracking
     }
 
-    /// Whether what it discards was tested and counted already.
+    /// True if samples that it discards were tested and counted already.
     pub(super) fn tests_early(&self) -> bool {
         self.stage.interface.early_tests
     }

@@ -1,4 +1,4 @@
-//! Where the pixels of a block and the blocks of a tile are.
+//! The places of a block's pixels and of a tile's blocks.
 
 use crate::limits::TILE_SIZE;
 use crate::raster::tile::place;
@@ -16,6 +16,9 @@ pub(super) const BLOCKS: usize = 16;
 pub(super) const ALL_BLOCKS: u64 = (1 << BLOCKS) - 1;
 /// Gaussians of a round: as many as phases pass on through the first-level cache, and a word has bits.
 pub(super) const ROUND: usize = 32;
+/// The places of arrays that are indexed by a Gaussian's number in its round. They are more than [`ROUND`], so that the
+/// number of a word's lowest bit, which is [`ROUND`] for zero, is a place without a check.
+pub(super) const PLACES: usize = ROUND + 8;
 
 /// Half of the distance between a block's first and last pixel centres.
 pub(super) const HALF: f32 = (BLOCK as f32 - 1.0) / 2.0;
@@ -34,7 +37,7 @@ pub(super) struct BlockMiddles {
 }
 
 impl BlockMiddles {
-    /// Of the tile at `corner`.
+    /// The middles of the blocks of the tile at `corner`.
     #[inline(always)]
     pub(super) fn new([x, y]: [u32; 2]) -> Self {
         let [x, y] = [f64::from(x), f64::from(y)];
@@ -62,7 +65,7 @@ const fn grid(column: bool) -> [f32; BLOCK_PIXELS] {
     out
 }
 
-/// The same numbers in binary64.
+/// Numbers of lanes in binary64.
 const fn widened(lanes: [f32; BLOCK_PIXELS]) -> [f64; BLOCK_PIXELS] {
     let mut out = [0.0; BLOCK_PIXELS];
     let mut lane = 0;
@@ -101,7 +104,7 @@ pub(super) fn block_and_lane(x: usize, y: usize) -> (usize, usize) {
     (place / BLOCK_PIXELS % BLOCKS, place % BLOCK_PIXELS)
 }
 
-/// How many pixels `lanes` has.
+/// The number of pixels in `lanes`.
 pub(super) fn count(lanes: &PixelMask) -> u32 {
     lanes.iter().map(|lanes| lanes.count_ones()).sum()
 }

@@ -1,13 +1,13 @@
-//! What compositing a tile takes and counts, and which kernel does it.
+//! The inputs and the account of compositing a tile, and the kernel that does it.
 //!
 //! A draw may let the plain kernel leave something inexact ([`Approximation`]).
 //!
-//! *Powers of two of fewer terms.* An alpha that errs by a part e of it changes a pixel by that part of what the Gaussian
-//! contributes, times the difference of two colours at most; all contributions add up to one.
+//! *Powers of two of fewer terms.* An alpha that errs by a part e of it changes a pixel by that part of what the
+//! Gaussian contributes, times the difference of two colours at most; all contributions add up to one.
 //!
-//! *TransmittanceBits that is left.* What is behind a transmittance of T contributes T at most, whatever it is. A block all of whose
-//! pixels have no more than the budget is looked at no further. (To leave out what is faint in front of others, too, needs
-//! a sum for each block and a bound of each Gaussian's alpha in it; that took as long as it saved.)
+//! *TransmittanceBits that is left.* What is behind a transmittance of T contributes T at most, whatever it is. A block
+//! all of whose pixels have no more than the budget is looked at no further. (To leave out what is faint in front of
+//! others, too, needs a sum for each block and a bound of each Gaussian's alpha in it; that took as long as it saved.)
 
 use super::accumulator::{NOT_TERMINATED, TransmittanceBits};
 use super::cut_off::CutOff;
@@ -27,16 +27,16 @@ use std::slice;
 /// Powers of two are formed down to this one.
 const MOST_FALL: f64 = 126.0;
 
-/// What the kernel does about depth; a constant, so that what isn't done costs nothing. Each from [`NO_DEPTH`] on does what
+/// The kernel's use of depths: a constant, so that what isn't done costs nothing. Each from [`NO_DEPTH`] on does what
 /// those from there to it do; before it are [`FAST_POWERS`] and [`FASTER_POWERS`].
 pub(super) type DepthMode = u8;
 /// Nothing: it only finishes the pixels that some Gaussian reaches.
 pub(super) const FIND_REACHED: DepthMode = 0;
-/// It composites.
+/// Composites.
 pub(super) const NO_DEPTH: DepthMode = 3;
-/// It leaves out what fails the test.
+/// Leaves out what fails the test.
 pub(super) const TEST_DEPTH: DepthMode = 4;
-/// It also finds the median.
+/// Also finds the median.
 pub(super) const FIND_MEDIAN: DepthMode = 5;
 /// And what the mean is made of.
 pub(super) const FIND_MEAN: DepthMode = 6;
@@ -50,7 +50,7 @@ pub(super) struct Thresholds {
     pub(super) alpha_floor: f32,
     pub(super) alpha_ceiling: f32,
     pub(super) transmittance_floor: f32,
-    /// What numbers of depths mean.
+    /// The encoding of depths as numbers.
     pub(super) depth_unit: DepthEncoding,
     /// The mode, for code that is the same for all of them: where time matters it is a constant.
     pub(super) depth_mode: DepthMode,
@@ -77,22 +77,22 @@ impl Thresholds {
     }
 }
 
-/// How a tile is composited; chosen once for a draw.
+/// The kernel that composites a tile, chosen once for a draw.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Kernel<'a> {
     /// Volumes in the order of the list, in binary32.
     Fast,
     /// Volumes in the order of the list, in binary16.
     Half,
-    /// Whatever shapes, in the order of the list or each pixel's own.
+    /// Any shapes, in the order of the list or each pixel's own.
     Exact {
         /// By batch, as the splats, if those are 2D Gaussians.
         surfels: Option<&'a [Vec<Surfel>]>,
-        /// Of 2D Gaussians' filter, if there is one.
+        /// The inverse variance of 2D Gaussians' filter, if there is one.
         inverse_low_pass: Option<f64>,
-        /// What pixels sort by, if each does so for itself.
+        /// The depths that pixels sort by, if each does so for itself.
         depths: Option<RayDepths<'a>>,
-        /// Whether sums are kept in binary64 where the order is the list's; each pixel's own order always does so.
+        /// True if sums are kept in binary64 where the order is the list's; each pixel's own order always does so.
         wide_sums: bool,
         /// The shape outside which nothing contributes, if there is one.
         cut_off: Option<CutOff>,
@@ -125,7 +125,7 @@ impl<'a> Kernel<'a> {
         }
     }
 
-    /// The same, but that pixels take the list's order, and nothing is tracked.
+    /// The same kernel, except that pixels take the list's order and nothing is tracked.
     pub(super) fn in_list_order(self) -> Self {
         match self {
             Self::Exact {
@@ -162,18 +162,18 @@ impl<'a> Kernel<'a> {
     }
 }
 
-/// Whether a draw's floors let more accumulators be seen than the usual ones.
+/// True if a draw's floors let more layers be seen through each other than the usual ones.
 pub(super) fn needs_f64_sums(state: &GaussianState) -> bool {
     let usual = GaussianState::default();
     state.transmittance_floor < usual.transmittance_floor || state.alpha_floor < usual.alpha_floor
 }
 
-/// It composites with powers of two of a cubic.
+/// Composites with powers of two of a cubic.
 pub(super) const FAST_POWERS: DepthMode = 1;
-/// Of a parabola.
+/// Composites with powers of two of a parabola.
 pub(super) const FASTER_POWERS: DepthMode = 2;
 
-/// How the plain kernel goes about a draw.
+/// The approximations of the plain kernel in a draw.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Approximation {
     /// [`NO_DEPTH`], or what is cheaper.
@@ -221,16 +221,16 @@ pub(super) fn power<S: Simd>(simd: S, mode: DepthMode, fall: f32x16<S>) -> f32x1
     }
 }
 
-/// What a tile's Gaussians are.
+/// A tile's Gaussians, and the constants of compositing them.
 #[derive(Clone, Copy)]
 pub(super) struct TileInputs<'a> {
     pub(super) splats: &'a [Vec<Splat>],
     pub(super) mode: Kernel<'a>,
     pub(super) list: &'a [u32],
-    /// What is left out.
+    /// The work that is left out.
     pub(super) optimizations: Optimizations,
     pub(super) trend: DepthTrend,
-    /// As [`BinnedDraw::half_period`].
+    /// Half of a panorama's period: see [`BinnedDraw::half_period`].
     pub(super) half_period: f64,
     pub(super) corner: [u32; 2],
     pub(super) thresholds: Thresholds,
@@ -253,7 +253,7 @@ impl<'a> TileInputs<'a> {
     }
 }
 
-/// What compositing a tile took.
+/// The account of compositing a tile.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct TileCounts {
     /// Entries of the tile's list, as far as there was need of it.
@@ -266,7 +266,7 @@ pub(super) struct TileCounts {
     pub(super) tiles_hidden: u64,
     pub(super) blocks_hidden: u64,
     pub(super) blocks_left_out: u64,
-    /// Of the hidden, those that end a list, if work is recorded.
+    /// The number of hidden Gaussians that end a list, if work is recorded.
     pub(super) hidden_rest: u32,
 }
 

@@ -1,8 +1,8 @@
-//! What is done with masks, in the form that is quick where they are registers of bits, and in that where they are vectors.
+//! Operations on masks, in the form that is quick where they are registers of bits, and in that where they are vectors.
 
 use fearless_simd::{Simd, f32x16, i32x16, mask32x16, prelude::*};
 
-/// Whether masks are registers of bits, as they are at the level whose vectors have 16 words.
+/// True if masks are registers of bits, as they are at the level whose vectors have 16 words.
 #[inline(always)]
 fn are_bits<S: Simd>() -> bool {
     S::f32s::LEN == 16
@@ -18,7 +18,7 @@ pub(super) fn only<S: Simd>(simd: S, mask: mask32x16<S>, floats: f32x16<S>) -> f
     }
 }
 
-/// How many lanes of masks are set.
+/// The number of set lanes of masks.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tally<S: Simd> {
     lanes: i32x16<S>,
@@ -51,12 +51,11 @@ impl<S: Simd> Tally<S> {
             self.bits += u64::from((mask.to_bitmask() & !others.to_bitmask()).count_ones());
         } else {
             // Masks are not combined: that would be calls.
-            let mask = mask.to_vector();
-            self.lanes += (mask & others.to_vector()) - mask;
+            self.lanes -= mask.to_vector() & (others.to_vector() ^ -1);
         }
     }
 
-    /// How many there were; no lane may be counted 2^31 times.
+    /// The number of lanes counted; no lane may be counted 2^31 times.
     #[inline(always)]
     pub(super) fn total(self) -> u64 {
         if are_bits::<S>() {

@@ -52,7 +52,7 @@ pub struct GaussianTileDraw<'a> {
     targets: Targets<'a>,
     /// The first colour attachment, unless the draw leaves it as it is.
     color: Option<ColorOutput>,
-    /// What makes colours in its place.
+    /// The resolve shader that makes colours in its place.
     resolve: Option<FragmentStageDraw<'a>>,
     tests: Tests,
     /// Samples of a pixel.

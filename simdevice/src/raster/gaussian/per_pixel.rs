@@ -1,9 +1,9 @@
 //! The per-pixel order: each pixel sorts what reaches it by depth along its own ray.
 //!
-//! Blocks are taken one by one. What reaches a block is evaluated for its 16 pixels at once, alpha and depth, in binary64;
-//! each pixel gathers what contributes to it, sorts it exactly and composites it front to back in binary64. A pixel holds
-//! the nearest [`HELD`] at a time: memory is bounded whatever a scene stacks up, and what a pass leaves out is gathered by
-//! the next, so that time stays near linear.
+//! Blocks are taken one by one. What reaches a block is evaluated for its 16 pixels at once, alpha and depth, in
+//! binary64; each pixel gathers what contributes to it, sorts it exactly and composites it front to back in binary64. A
+//! pixel holds the nearest [`HELD`] at a time: memory is bounded whatever a scene stacks up, and what a pass leaves out
+//! is gathered by the next, so that time stays near linear.
 
 use super::accumulator::Accumulator;
 use super::block_lists::{BlockLists, part};
@@ -25,7 +25,7 @@ const HELD: usize = 16_384;
 #[cfg(test)]
 pub(super) const HELD: usize = 64;
 
-/// What a Gaussian contributes to a pixel.
+/// A Gaussian's contribution to a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Contribution {
     /// Its place in the pixel's order: depth, then the place in the block's list, which follows the draw.
@@ -34,9 +34,9 @@ struct Contribution {
     alpha: u32,
 }
 
-/// What comes before everything.
+/// The key before all others.
 const START: (u64, u32) = (0, 0);
-/// What comes after everything.
+/// The key after all others.
 const END: (u64, u32) = (u64::MAX, u32::MAX);
 
 /// One pixel's contributions: the nearest of those beyond `after`.
@@ -44,7 +44,7 @@ const END: (u64, u32) = (u64::MAX, u32::MAX);
 struct Gathered {
     list: Vec<Contribution>,
     after: (u64, u32),
-    /// Those from here on are left to the next pass.
+    /// The key from which on contributions are left to the next pass.
     limit: (u64, u32),
 }
 
@@ -77,7 +77,7 @@ impl Gathered {
         }
     }
 
-    /// What was gathered, in order.
+    /// The contributions that were gathered, in order.
     fn sorted(&mut self) -> &[Contribution] {
         self.list.sort_unstable();
         &self.list
@@ -95,7 +95,7 @@ impl Gathered {
     }
 }
 
-/// What a pixel accumulates.
+/// The sums of a pixel.
 #[derive(Clone, Copy, Debug)]
 struct Sum {
     color: [f64; 3],
@@ -177,7 +177,7 @@ impl PerPixel {
                 let alpha = exp2_of_negated(simd, fall).min(ceiling);
                 let mut reached = fall.simd_le(task.thresholds.most_fall);
                 if task.thresholds.depth_mode > NO_DEPTH {
-                    reached &= ranges.pixels(simd, block, splat.depth);
+                    reached &= ranges.pixels(simd, block, splat.look.depth);
                 }
                 let mut reached = reached.to_bitmask() as u32 & open;
                 if reached == 0 {
@@ -234,11 +234,11 @@ fn composite_pixel(
         }
         let (batch, place) = locate(names[contribution.place.1 as usize]);
         let splat = &task.splats[batch][place];
-        for (sum, color) in sum.color.iter_mut().zip(splat.color) {
+        for (sum, color) in sum.color.iter_mut().zip(splat.look.color) {
             *sum += weight * f64::from(color);
         }
         if task.thresholds.depth_mode >= FIND_MEDIAN && sum.transmittance >= 0.5 {
-            sum.median = splat.depth;
+            sum.median = splat.look.depth;
         }
         sum.transmittance = rest;
         sum.covered = true;

@@ -1,5 +1,5 @@
-//! Phases 2 and 3 of the tile kernel: the alphas of Gaussians in blocks, and those through the pixels of a block, which stay in
-//! registers.
+//! Phases 2 and 3 of the tile kernel: the alphas of Gaussians in blocks, and those through the pixels of a block, which
+//! stay in registers.
 
 use super::accumulator::Accumulator;
 use super::depth_ranges::DepthRanges;
@@ -9,13 +9,13 @@ use super::inputs::{
 };
 use super::masks::{Tally, only};
 use super::staging::{Reaching, StagedRound};
-use crate::gaussian::splat::Splat;
+use crate::gaussian::splat::{Splat, SplatLook};
 #[cfg(feature = "mistakes")]
 use crate::mistakes::Mistake;
 use crate::simd::bits_of;
 use fearless_simd::{Simd, f32x16, f64x8, i32x16, mask32x16, prelude::*, u32x16};
 
-/// What a block's pixels have accumulated.
+/// The sums of a block's pixels.
 ///
 /// Nothing here is indexed or iterated over, or it would leave the registers.
 #[derive(Clone, Copy)]
@@ -26,9 +26,9 @@ struct Pixels<S: Simd> {
     transmittance: f32x16<S>,
 }
 
-/// What a Gaussian does to a block's pixels.
+/// A Gaussian's effect on a block's pixels.
 struct Passed<S: Simd> {
-    /// What it contributes.
+    /// Its contribution.
     weight: f32x16<S>,
     /// The transmittance behind it.
     rest: f32x16<S>,
@@ -54,10 +54,11 @@ impl Default for Alphas {
 }
 
 impl Alphas {
-    /// Finds the alphas of what is reached; returns how many pixels that is, of those that are not finished.
+    /// Finds the alphas of all Gaussians in the blocks that they may reach. Returns the number of pixels that they
+    /// reach, of those that are not finished, and the number of pairs of a Gaussian and a block.
     ///
-    /// They come before any is composited, since they do not depend on each other: several are on their way at a time. A
-    /// function of its own, so that its constants have the registers for themselves.
+    /// They come before any is composited, since they do not depend on each other: several are on their way at a time.
+    /// A function of its own, so that its constants have the registers for themselves.
     #[inline(never)]
     fn find<S: Simd, const DEPTH: DepthMode>(
         &mut self,
@@ -66,25 +67,30 @@ impl Alphas {
         (round, most_fall): (&StagedRound, &[[f32; BLOCK_PIXELS]; BLOCKS]),
         ranges: &DepthRanges,
         thresholds: Thresholds,
-    ) -> u64 {
+    ) -> (u64, u64) {
         simd.vectorize(
             #[inline(always)]
             || {
                 let ceiling = f32x16::splat(simd, thresholds.alpha_ceiling);
                 let mut pixels = Tally::new(simd);
                 let mut items = &mut self.alphas[..];
+                let mut count_of_all = 0;
                 for (block, &reaching) in reaching.iter().enumerate() {
                     let count = reaching.count_ones() as usize;
                     let Some((alphas, others)) = items.split_at_mut_checked(count) else {
                         break;
                     };
                     items = others;
+                    count_of_all += count as u64;
+                    let Some(column) = round.column(block) else {
+                        break;
+                    };
                     let most_fall = f32x16::from_slice(simd, &most_fall[block]);
                     let mut rest = reaching;
                     for to in alphas {
-                        let number = rest.trailing_zeros() as usize % ROUND;
+                        let number = rest.trailing_zeros() as usize;
                         rest &= rest.wrapping_sub(1);
-                        let fall = round.falls(simd, number, block);
+                        let fall = round.falls(simd, number, (block, column));
                         let at = (block, round.looks[number].depth);
                         let reached = reached(simd, DEPTH, at, fall, ranges, most_fall);
                         pixels.add(reached);
@@ -92,7 +98,7 @@ impl Alphas {
                         alpha.store_slice(to);
                     }
                 }
-                pixels.total()
+                (pixels.total(), count_of_all)
             },
         )
     }
@@ -116,7 +122,8 @@ fn reached<S: Simd>(
     }
 }
 
-/// The alphas of pixels where they have fallen so far; zero where nothing is reached: too far down, powers mean nothing.
+/// The alphas of pixels where they have fallen so far; zero where nothing is reached: too far down, powers mean
+/// nothing.
 #[inline(always)]
 fn alpha<S: Simd>(
     simd: S,
@@ -128,7 +135,18 @@ fn alpha<S: Simd>(
     only(simd, reached, power(simd, mode, fall).min(ceiling))
 }
 
-/// Composites those of `round` that reach a block in it, for each block; returns how many pixels accepted one.
+/// The account of a round's composition.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Evaluated {
+    /// Pairs of a Gaussian and a block whose pixels were evaluated.
+    pub(super) items: u64,
+    /// Pairs of a Gaussian and a pixel that accepted it.
+    pub(super) contributions: u64,
+    /// True if pixels may have been finished.
+    pub(super) may_have_finished: bool,
+}
+
+/// Composites those of `round` that reach a block in it, for each block.
 #[inline(always)]
 pub(super) fn evaluate<S: Simd, const DEPTH: DepthMode>(
     accumulator: &mut Accumulator,
@@ -137,16 +155,20 @@ pub(super) fn evaluate<S: Simd, const DEPTH: DepthMode>(
     (round, alphas): (&StagedRound, &mut Alphas),
     ranges: &DepthRanges,
     thresholds: Thresholds,
-) -> u64 {
+) -> Evaluated {
     let to = (round, &accumulator.most_fall);
-    let reached = alphas.find::<_, DEPTH>(simd, reaching, to, ranges, thresholds);
+    let (reached, items) = alphas.find::<_, DEPTH>(simd, reaching, to, ranges, thresholds);
     let refused =
         composite_all::<_, DEPTH>(accumulator, simd, reaching, (round, alphas), thresholds);
-    reached.saturating_sub(refused)
+    Evaluated {
+        items,
+        contributions: reached.saturating_sub(refused.unwrap_or(0)),
+        may_have_finished: refused.is_some(),
+    }
 }
 
-/// Composites the alphas of a round; returns how many pixels refused one, since they are finished. A function of its own,
-/// as [`Alphas::find`].
+/// Composites the alphas of a round; returns how many pixels refused one, since they are finished, or `None` if no
+/// pixel was finished in the round. A function of its own, as [`Alphas::find`].
 #[inline(never)]
 fn composite_all<S: Simd, const DEPTH: DepthMode>(
     accumulator: &mut Accumulator,
@@ -154,11 +176,11 @@ fn composite_all<S: Simd, const DEPTH: DepthMode>(
     reaching: &Reaching,
     (round, alphas): (&StagedRound, &Alphas),
     thresholds: Thresholds,
-) -> u64 {
+) -> Option<u64> {
     simd.vectorize(
         #[inline(always)]
         || {
-            let mut refused = 0;
+            let mut refused = None;
             let mut rest = &alphas.alphas[..];
             for (block, &reaching) in reaching.iter().enumerate() {
                 let count = reaching.count_ones() as usize;
@@ -174,13 +196,16 @@ fn composite_all<S: Simd, const DEPTH: DepthMode>(
                     || DEPTH >= FIND_MEDIAN
                     || !composite_far_from_floor(accumulator, simd, of_block, round, thresholds)
                 {
-                    refused += composite_near_floor::<_, DEPTH>(
+                    let more = composite_near_floor::<_, DEPTH>(
                         accumulator,
                         simd,
                         of_block,
                         round,
                         thresholds,
                     );
+                    if let Some(more) = more {
+                        refused = Some(refused.unwrap_or(0) + more);
+                    }
                 }
             }
             refused
@@ -188,8 +213,8 @@ fn composite_all<S: Simd, const DEPTH: DepthMode>(
     )
 }
 
-/// Composites a block's alphas, if no pixel comes so near the floor that it is finished; else it changes nothing. Returns
-/// whether it did.
+/// Composites a block's alphas, if no pixel comes so near the floor that it is finished; else it changes nothing.
+/// Returns whether it did.
 #[inline(always)]
 fn composite_far_from_floor<S: Simd>(
     accumulator: &mut Accumulator,
@@ -210,7 +235,7 @@ fn composite_far_from_floor<S: Simd>(
     // What is finished has alphas of zero.
     pixels.transmittance = before.max(0.0);
     for alpha in alphas {
-        let look = &round.looks[reaching.trailing_zeros() as usize % ROUND];
+        let look = &round.looks[reaching.trailing_zeros() as usize];
         reaching &= reaching.wrapping_sub(1);
         let passed = pixels.pass(f32x16::from_slice(simd, alpha));
         pixels.transmittance = passed.rest;
@@ -227,41 +252,48 @@ fn composite_far_from_floor<S: Simd>(
     true
 }
 
-/// Composites a block's alphas; returns how many pixels refused one. A function of its own, so that what goes the quick way
-/// has the registers for itself.
+/// Composites a block's alphas; returns how many pixels refused one, or `None` if no pixel was finished. A function of
+/// its own, so that what goes the quick way has the registers for itself.
 #[inline(never)]
 fn composite_near_floor<S: Simd, const DEPTH: DepthMode>(
     accumulator: &mut Accumulator,
     simd: S,
-    (block, mut reaching, mut alphas): (usize, u32, &[[f32; BLOCK_PIXELS]]),
+    (block, reaching, alphas): (usize, u32, &[[f32; BLOCK_PIXELS]]),
     round: &StagedRound,
     thresholds: Thresholds,
-) -> u64 {
+) -> Option<u64> {
     simd.vectorize(
         #[inline(always)]
         || {
+            let (mut reaching, mut alphas) = (reaching, alphas);
             if DEPTH != FIND_REACHED && DEPTH < FIND_MEDIAN {
-                let of_block = (block, &mut reaching, &mut alphas);
-                composite_until_finished(accumulator, simd, of_block, round, thresholds);
+                let of_block = (block, reaching, alphas);
+                (reaching, alphas) =
+                    composite_until_finished(accumulator, simd, of_block, round, thresholds);
                 if alphas.is_empty() {
-                    return 0;
+                    return None;
                 }
             }
             let of_block = (block, reaching, alphas);
-            composite_carefully::<_, DEPTH>(accumulator, simd, of_block, round, thresholds)
+            let refused =
+                composite_carefully::<_, DEPTH>(accumulator, simd, of_block, round, thresholds);
+            Some(refused)
         },
     )
 }
 
-/// Composites the first of a block's alphas, up to one that finishes a pixel, and leaves the others.
+/// Alphas of a block, in order, and bits for the numbers of their Gaussians.
+type BlockAlphas<'a> = (u32, &'a [[f32; BLOCK_PIXELS]]);
+
+/// Composites the first of a block's alphas, up to one that finishes a pixel, and returns the others.
 #[inline(always)]
-fn composite_until_finished<S: Simd>(
+fn composite_until_finished<'a, S: Simd>(
     accumulator: &mut Accumulator,
     simd: S,
-    (block, reaching, alphas): (usize, &mut u32, &mut &[[f32; BLOCK_PIXELS]]),
+    (block, mut reaching, mut alphas): (usize, u32, &'a [[f32; BLOCK_PIXELS]]),
     round: &StagedRound,
     thresholds: Thresholds,
-) {
+) -> BlockAlphas<'a> {
     let floor = f32x16::splat(simd, thresholds.transmittance_floor);
     let mut pixels = pixels(accumulator, simd, block);
     let before = pixels.transmittance;
@@ -269,22 +301,23 @@ fn composite_until_finished<S: Simd>(
     // What is finished has alphas of zero: here it has light that stays.
     let light = f32x16::splat(simd, f32::MAX);
     pixels.transmittance = signs.simd_lt(0).select(light, before);
-    while let [alpha, rest @ ..] = *alphas {
+    while let [alpha, rest @ ..] = alphas {
         let passed = pixels.pass(f32x16::from_slice(simd, alpha));
         if passed.rest.simd_lt(floor).any_true() {
             break;
         }
-        let look = &round.looks[reaching.trailing_zeros() as usize % ROUND];
-        *reaching &= reaching.wrapping_sub(1);
-        *alphas = rest;
+        let look = &round.looks[reaching.trailing_zeros() as usize];
+        reaching &= reaching.wrapping_sub(1);
+        alphas = rest;
         pixels.transmittance = passed.rest;
         pixels.add(simd, passed.weight, look.color);
     }
     pixels.transmittance = signs.simd_lt(0).select(before, pixels.transmittance);
     keep(accumulator, block, pixels);
+    (reaching, alphas)
 }
 
-/// Composites a block's alphas; returns how many pixels refused one.
+/// Composites a block's alphas; returns the number of pixels that refused one.
 #[inline(always)]
 fn composite_carefully<S: Simd, const DEPTH: DepthMode>(
     accumulator: &mut Accumulator,
@@ -300,11 +333,11 @@ fn composite_carefully<S: Simd, const DEPTH: DepthMode>(
     let mut pixels = pixels(accumulator, simd, block);
     let mut refused = Tally::new(simd);
     for alpha in alphas {
-        let look = &round.looks[reaching.trailing_zeros() as usize % ROUND];
+        let look = &round.looks[reaching.trailing_zeros() as usize];
         reaching &= reaching.wrapping_sub(1);
         let alpha = f32x16::from_slice(simd, alpha);
-        let (to, look) = ((block, &mut pixels), (look.color, look.depth));
-        let goes_on = composite_one(accumulator, simd, to, alpha, look, thresholds);
+        let to = (block, &mut pixels);
+        let goes_on = composite_one(accumulator, simd, to, alpha, *look, thresholds);
         refused.add_without(alpha.simd_gt(0.0), goes_on);
     }
     keep(accumulator, block, pixels);
@@ -312,7 +345,8 @@ fn composite_carefully<S: Simd, const DEPTH: DepthMode>(
     refused.total()
 }
 
-/// As [`evaluate`], of one steep Gaussian in `blocks`: exponents are formed in binary64.
+/// Composites one steep Gaussian in `blocks`, its exponents formed in binary64; returns the number of pixels that
+/// accepted it.
 #[inline(always)]
 pub(super) fn evaluate_steep<S: Simd, const DEPTH: DepthMode>(
     accumulator: &mut Accumulator,
@@ -329,7 +363,7 @@ pub(super) fn evaluate_steep<S: Simd, const DEPTH: DepthMode>(
     let mut contributions = 0;
     for block in (0..BLOCKS).filter(|block| blocks >> block & 1 == 1) {
         let fall = falls_64(simd, splat, task, block);
-        let look = (splat.color, splat.depth);
+        let look = splat.look;
         contributions += accumulate(accumulator, simd, block, fall, look, ranges, thresholds);
         accumulator.find_most_fall(simd, block, thresholds.most_fall);
     }
@@ -344,14 +378,14 @@ pub(super) fn accumulate<S: Simd>(
     simd: S,
     block: usize,
     fall: f32x16<S>,
-    look: ([f32; 3], u32),
+    look: SplatLook,
     ranges: &DepthRanges,
     thresholds: Thresholds,
 ) -> u64 {
     let mut pixels = pixels(accumulator, simd, block);
     let most_fall = f32x16::splat(simd, thresholds.most_fall);
     let mode = thresholds.depth_mode;
-    let reached = reached(simd, mode, (block, look.1), fall, ranges, most_fall);
+    let reached = reached(simd, mode, (block, look.depth), fall, ranges, most_fall);
     let ceiling = f32x16::splat(simd, thresholds.alpha_ceiling);
     let alpha = alpha(simd, mode, reached, fall, ceiling);
     let at = (block, &mut pixels);
@@ -387,15 +421,15 @@ fn keep<S: Simd>(accumulator: &mut Accumulator, block: usize, pixels: Pixels<S>)
 
 /// Composites a Gaussian of a colour and a depth in a block; returns which pixels it does not finish.
 ///
-/// What does not reach a pixel is composited with an alpha of zero, which changes nothing: to leave it out would take
-/// longer.
+/// A Gaussian that does not reach a pixel is composited with an alpha of zero, which changes nothing: to leave it out
+/// would take longer.
 #[inline(always)]
 fn composite_one<S: Simd>(
     accumulator: &mut Accumulator,
     simd: S,
     (block, pixels): (usize, &mut Pixels<S>),
     alpha: f32x16<S>,
-    (color, depth): ([f32; 3], u32),
+    SplatLook { color, depth }: SplatLook,
     thresholds: Thresholds,
 ) -> mask32x16<S> {
     let t = pixels.transmittance;
@@ -439,7 +473,7 @@ fn composite_one<S: Simd>(
 }
 
 impl<S: Simd> Pixels<S> {
-    /// What a Gaussian of so much alpha does. What is left is rounded once, where processors can.
+    /// The effect of a Gaussian of so much alpha. The transmittance behind it is rounded once, where processors can.
     #[inline(always)]
     fn pass(&self, alpha: f32x16<S>) -> Passed<S> {
         let t = self.transmittance;
@@ -466,10 +500,10 @@ impl<S: Simd> Pixels<S> {
     }
 }
 
-/// How far a Gaussian's alpha has fallen at a block's pixels, formed in binary64: minus its base-2 logarithm, but no less
+/// The fall of a Gaussian's alpha at a block's pixels, formed in binary64: minus its base-2 logarithm, but no less
 /// than -1, which is more than any ceiling, and still a power that is formed.
 ///
-/// What is wider than the period of a panorama counts where it is nearer than its copies.
+/// A Gaussian wider than the period of a panorama counts where it is nearer than its copies.
 #[inline(always)]
 pub(super) fn falls_64<S: Simd>(
     simd: S,

@@ -1,16 +1,16 @@
-//! What becomes of a tile's samples.
+//! A tile's samples and their tests.
 
 use super::grid::{BLOCKS, PixelMask};
 use crate::limits::MAX_SAMPLES;
 
 pub(super) const SAMPLES: usize = MAX_SAMPLES as usize;
 
-/// What becomes of a tile's samples: lanes by sample and block.
+/// A tile's samples and their tests: lanes by sample and block.
 #[derive(Debug, Default)]
 pub(super) struct Samples {
-    /// Those that the draw may touch, and whose stored depth lies within bounds.
+    /// Samples that the draw may touch, and whose stored depth lies within bounds.
     pub(super) candidates: [PixelMask; SAMPLES],
-    /// Those of them that pass the stencil test.
+    /// Candidates that pass the stencil test.
     pub(super) tested: [PixelMask; SAMPLES],
     /// The accumulator that a sample's block is composited in.
     pub(super) accumulators: [[usize; BLOCKS]; SAMPLES],

@@ -1,70 +1,90 @@
 //! Phase 1 of the tile kernel: what the others need of a round's Gaussians in a tile, and which blocks each may reach.
 
 use super::depth_ranges::DepthRanges;
-use super::grid::{BLOCK_PIXELS, BLOCKS, BLOCKS_ACROSS, BlockMiddles, HALF, LANE_X, LANE_Y, ROUND};
+use super::grid::{
+    BLOCK_PIXELS, BLOCKS, BLOCKS_ACROSS, BlockMiddles, HALF, LANE_X, LANE_Y, PLACES, ROUND,
+};
 use super::inputs::{DepthMode, NO_DEPTH, TileInputs};
-use crate::gaussian::splat::Splat;
+use crate::gaussian::splat::{Splat, SplatLook};
 use crate::stats::optimizations::Optimization;
-use fearless_simd::{Simd, f32x8, f32x16, f64x4, mask32x16, prelude::*};
+use fearless_simd::{Simd, f32x8, f32x16, f64x4, i32x16, mask32x16, prelude::*, u32x16};
 
-/// What rounding may do to exponents, relative to them.
+/// A bound of rounding's effect on exponents, relative to them.
 const ROOM_FACTOR: f32 = 1.0 + 1e-5;
 
-/// Which of a round's Gaussians may reach each block: a bit for each.
+/// The Gaussians of a round that may reach each block: a bit for each.
 pub(super) type Reaching = [u32; BLOCKS];
 
+/// The Gaussians of a round that may reach each block, while they are found: the bits of eight a byte.
+type ReachingBytes = [[u8; ROUND / 8]; BLOCKS];
+
 /// A round's Gaussians in a tile.
-#[derive(Debug, Default)]
-#[repr(align(64))]
+#[derive(Debug)]
+#[repr(C, align(64))]
 pub(super) struct StagedRound {
     /// `u` at the middle of each column of blocks, by column and then by Gaussian.
-    u: [[f32; ROUND]; BLOCKS_ACROSS],
+    u: [[f32; PLACES]; BLOCKS_ACROSS],
     /// `v` at the middle of each block, by block and then by Gaussian.
-    v: [[f32; ROUND]; BLOCKS],
+    v: [[f32; PLACES]; BLOCKS],
+    /// By pair of columns of blocks, then by Gaussian, then by column of the pair: `u^2` less the logarithm of the
+    /// opacity at the pixels of two rows of a block. Its other two rows have the same. As are `along` and `looks`, it
+    /// is there for Gaussians that may reach a block.
+    from_u: [[[f32; BLOCK_PIXELS / 2]; 2 * PLACES]; BLOCKS_ACROSS / 2],
+    /// By Gaussian, the addition of a pixel's offset from the middle of its block to `v` there.
+    along: [[f32; BLOCK_PIXELS]; PLACES],
+    pub(super) looks: [SplatLook; PLACES],
     gathered: Gathered,
-    records: [StagedSplat; ROUND],
-    pub(super) looks: [SplatColor; ROUND],
+}
+
+/// The squares of `u` in a column of blocks: those of Gaussian `number` are at twice that number.
+pub(super) type ColumnSquares = [[f32; BLOCK_PIXELS / 2]; 2 * PLACES - 1];
+
+impl Default for StagedRound {
+    fn default() -> Self {
+        Self {
+            u: [[0.0; PLACES]; BLOCKS_ACROSS],
+            v: [[0.0; PLACES]; BLOCKS],
+            gathered: Gathered::default(),
+            from_u: [[[0.0; BLOCK_PIXELS / 2]; 2 * PLACES]; BLOCKS_ACROSS / 2],
+            along: [[0.0; BLOCK_PIXELS]; PLACES],
+            looks: [SplatLook::default(); PLACES],
+        }
+    }
 }
 
 /// Numbers by which several Gaussians are placed at a time: by element, and then by Gaussian.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Gathered {
     mean: [[f64; ROUND]; 2],
     factor: [[f64; ROUND]; 3],
     /// The factor, rounded.
-    narrow: [[f32; ROUND]; 3],
+    narrow: [[f32; PLACES]; 3],
     log2_opacity: [f32; ROUND],
+    /// Depths, if they are tested.
     depth: [u32; ROUND],
 }
 
-/// Numbers that finding alphas takes, but for `v` at the middles of blocks.
-#[derive(Clone, Copy, Debug, Default)]
-#[repr(C, align(64))]
-struct StagedSplat {
-    /// By column of blocks, `u^2` less the logarithm of the opacity at the pixels of two rows: both pairs of a block's rows
-    /// have the same.
-    from_u: [[f32; BLOCK_PIXELS / 2]; BLOCKS_ACROSS],
-    /// What a pixel's offset from the middle of its block adds to `v` there.
-    along: [f32; BLOCK_PIXELS],
+impl Default for Gathered {
+    fn default() -> Self {
+        Self {
+            mean: [[0.0; ROUND]; 2],
+            factor: [[0.0; ROUND]; 3],
+            narrow: [[0.0; PLACES]; 3],
+            log2_opacity: [0.0; ROUND],
+            depth: [0; ROUND],
+        }
+    }
 }
 
-/// What it takes to composite.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct SplatColor {
-    pub(super) color: [f32; 3],
-    /// As [`Splat::depth`].
-    pub(super) depth: u32,
-}
-
-/// What became of a round's Gaussians, up to a steep one.
+/// The outcome of placing a round's Gaussians, up to a steep one.
 #[derive(Debug, Default)]
 pub(super) struct Placed {
     pub(super) reaching: Reaching,
-    /// How many there are.
+    /// The number of Gaussians placed.
     pub(super) count: u64,
-    /// The round's first that is steep from where they begin, or its end.
+    /// The number in the round of the first steep Gaussian from where they begin, or the round's length.
     pub(super) end: usize,
-    /// Those that depths hide in all of the tile.
+    /// Gaussians that depths hide in all of the tile.
     pub(super) tiles_hidden: u64,
     /// Blocks in which depths hide the others.
     pub(super) blocks_hidden: u64,
@@ -73,8 +93,8 @@ pub(super) struct Placed {
 }
 
 impl StagedRound {
-    /// Places the Gaussians of a tile's round from number `from` on, before one that is steep, and has as many of the next round
-    /// on their way, which are then `ahead`. `open` are the blocks that are not finished.
+    /// Places the Gaussians of a tile's round from number `from` on, before one that is steep, and has as many of the
+    /// next round on their way, which are then `ahead`. `open` are the blocks that are not finished.
     #[inline(never)]
     pub(super) fn place<'a, S: Simd, const DEPTH: DepthMode>(
         &mut self,
@@ -95,7 +115,7 @@ impl StagedRound {
                     if let Some(&primitive) = next.get(number) {
                         ahead[number % ROUND] = task.prefetched(primitive);
                     }
-                    if DEPTH > NO_DEPTH && ranges.hides(splat.depth) {
+                    if DEPTH > NO_DEPTH && ranges.hides(splat.look.depth) {
                         number += 1;
                         placed.tiles_hidden += 1;
                         if is_recorded {
@@ -106,33 +126,48 @@ impl StagedRound {
                     if splat.needs_f64 {
                         break;
                     }
-                    self.gather(number % ROUND, splat);
+                    self.gather::<DEPTH>(number % ROUND, splat);
                     present |= 1 << (number % ROUND);
                     number += 1;
                 }
                 placed.end = number;
                 placed.count = present.count_ones().into();
-                let bounded = task.optimizations.has(Optimization::Blocks);
                 let middles = BlockMiddles::new(task.corner);
-                let mut reaching = [0; BLOCKS];
+                let mut reaching = [[0; ROUND / 8]; BLOCKS];
                 for first in (from / S::f32s::LEN * S::f32s::LEN..number).step_by(S::f32s::LEN) {
                     let most_fall = task.thresholds.most_fall;
                     self.find_blocks(simd, first, &middles, most_fall, &mut reaching);
                 }
-                for number in from..number {
-                    self.record(simd, number % ROUND);
+                let mut reaching = u32x16::simd_from(simd, words_of(reaching));
+                if !task.optimizations.has(Optimization::Blocks) {
+                    reaching = u32x16::splat(simd, u32::MAX);
                 }
-                for (block, reaching) in reaching.iter_mut().enumerate() {
-                    let is_open = open >> block & 1 == 1;
-                    let all = if bounded { *reaching } else { u32::MAX };
-                    *reaching = if is_open { all & present } else { 0 };
-                    if DEPTH > NO_DEPTH && *reaching != 0 {
+                let open: i32x16<S> = open_mask.to_vector();
+                let mut reaching = reaching & open.bitcast::<u32x16<S>>() & present;
+                if DEPTH > NO_DEPTH {
+                    let mut words = reaching.to_array();
+                    for (block, word) in words.iter_mut().enumerate().filter(|(_, word)| **word > 0)
+                    {
                         let shown = ranges.shown(simd, block, &self.gathered.depth);
-                        placed.blocks_hidden += u64::from((*reaching & !shown).count_ones());
-                        *reaching &= shown;
+                        placed.blocks_hidden += u64::from((*word & !shown).count_ones());
+                        *word &= shown;
+                    }
+                    reaching = u32x16::simd_from(simd, words);
+                }
+                let (low, high) = reaching.split();
+                let (low, high) = (low | high).split();
+                let mut any = (low | high)
+                    .to_array()
+                    .into_iter()
+                    .fold(0, |any, word| any | word);
+                while any != 0 {
+                    let number = any.trailing_zeros() as usize;
+                    any &= any - 1;
+                    if let Some(splat) = round.get(number) {
+                        self.record(simd, number, splat);
                     }
                 }
-                placed.reaching = reaching;
+                placed.reaching = reaching.to_array();
                 placed
             },
         )
@@ -140,7 +175,7 @@ impl StagedRound {
 
     /// Makes `splat` the round's Gaussian `number`.
     #[inline(always)]
-    fn gather(&mut self, number: usize, splat: &Splat) {
+    fn gather<const DEPTH: DepthMode>(&mut self, number: usize, splat: &Splat) {
         let Gathered {
             mean,
             factor,
@@ -155,38 +190,35 @@ impl StagedRound {
             lanes[number] = part;
         }
         log2_opacity[number] = splat.log2_opacity;
-        depth[number] = splat.depth;
-        self.looks[number] = SplatColor {
-            color: splat.color,
-            depth: splat.depth,
-        };
+        if DEPTH > NO_DEPTH {
+            depth[number] = splat.look.depth;
+        }
     }
 
-    /// Makes the record of Gaussian `number`, whose `u` is known.
+    /// Finds `from_u`, `along` and the look of `splat`, the round's Gaussian `number`, whose `u` is known.
     #[inline(always)]
-    fn record<S: Simd>(&mut self, simd: S, number: usize) {
-        let Gathered {
-            narrow,
-            log2_opacity,
-            ..
-        } = &self.gathered;
+    fn record<S: Simd>(&mut self, simd: S, number: usize, splat: &Splat) {
+        self.looks[number] = splat.look;
+        let narrow = &self.gathered.narrow;
         let [a, b, c] = [narrow[0][number], narrow[1][number], narrow[2][number]];
-        let log2_opacity = f32x8::splat(simd, log2_opacity[number]);
-        let record = &mut self.records[number];
+        let log2_opacity = f32x8::splat(simd, splat.log2_opacity);
         let columns = f32x8::from_slice(simd, &LANE_X[..BLOCK_PIXELS / 2]);
         let across = columns * a;
-        for (from_u, u) in record.from_u.iter_mut().zip(&self.u) {
-            let u = across + u[number];
-            u.mul_sub(u, log2_opacity).store_slice(from_u);
+        for (from_u, u) in self.from_u.iter_mut().zip(self.u.as_chunks::<2>().0) {
+            for (column, u) in u.iter().enumerate() {
+                let u = across + u[number];
+                let to = &mut from_u[2 * number + column];
+                u.mul_sub(u, log2_opacity).store_slice(to);
+            }
         }
         let sheared = columns * b;
         let rows = f32x16::simd_from(simd, LANE_Y);
         let along = rows.mul_add(f32x16::splat(simd, c), sheared.combine(sheared));
-        along.store_slice(&mut record.along);
+        along.store_slice(&mut self.along[number]);
     }
 
-    /// Finds `u` and `v` of the Gaussians from number `first` on, as many as a vector has lanes, and which blocks each may
-    /// reach.
+    /// Finds `u` and `v` of the Gaussians from number `first` on, as many as a vector has lanes, and which blocks each
+    /// may reach.
     #[inline(always)]
     fn find_blocks<S: Simd>(
         &mut self,
@@ -194,7 +226,7 @@ impl StagedRound {
         first: usize,
         middles: &BlockMiddles,
         most_fall: f32,
-        reaching: &mut Reaching,
+        reaching: &mut ReachingBytes,
     ) {
         let lanes = first..first + S::f32s::LEN;
         let wide = |lanes: &[f64; ROUND]| -> Wide<S> {
@@ -245,20 +277,51 @@ impl StagedRound {
                 // The least |u| and |v| over a block's centres, each for itself: together they bound u^2 + v^2.
                 let least_v = (v.abs() - around_v).max(zero);
                 let least = least_v.mul_add(least_v, least_u[column]);
-                let may_reach = least.simd_le(room).to_bitmask() as u32;
-                reaching[block] |= may_reach << first;
+                let may_reach = least.simd_le(room).to_bitmask();
+                set_bits(&mut reaching[block], first, S::f32s::LEN, may_reach);
             }
         }
     }
 
-    /// How far alpha has fallen at a block's pixels: minus its base-2 logarithm.
+    /// The squares of `u` in a block's column of blocks.
     #[inline(always)]
-    pub(super) fn falls<S: Simd>(&self, simd: S, number: usize, block: usize) -> f32x16<S> {
-        let record = &self.records[number];
-        let from_u = f32x8::from_slice(simd, &record.from_u[block % BLOCKS_ACROSS]);
-        let v = f32x16::from_slice(simd, &record.along) + self.v[block][number];
+    pub(super) fn column(&self, block: usize) -> Option<&ColumnSquares> {
+        self.from_u[block % BLOCKS_ACROSS / 2][block % 2..].first_chunk()
+    }
+
+    /// The fall of a Gaussian's alpha at a block's pixels: minus its base-2 logarithm. `column` is that of the block.
+    #[inline(always)]
+    pub(super) fn falls<S: Simd>(
+        &self,
+        simd: S,
+        number: usize,
+        (block, column): (usize, &ColumnSquares),
+    ) -> f32x16<S> {
+        let from_u = f32x8::from_slice(simd, &column[2 * number]);
+        let v = f32x16::from_slice(simd, &self.along[number]) + self.v[block][number];
         v.mul_add(v, from_u.combine(from_u))
     }
+}
+
+/// Sets the bits of `count` Gaussians from number `first` on, a multiple of `count`, in bytes where they are zero.
+#[inline(always)]
+fn set_bits(bytes: &mut [u8; ROUND / 8], first: usize, count: usize, bits: u64) {
+    let at = first / 8 % bytes.len();
+    match count {
+        8 => bytes[at] = bits as u8,
+        16 => bytes[at & !1..][..2].copy_from_slice(&(bits as u16).to_le_bytes()),
+        _ => bytes[at] |= (bits << (first % 8)) as u8,
+    }
+}
+
+/// The words of which these are the bytes, the lowest first.
+#[inline(always)]
+fn words_of(bytes: ReachingBytes) -> Reaching {
+    let mut words: Reaching = bytemuck::cast(bytes);
+    for word in &mut words {
+        *word = u32::from_le(*word);
+    }
+    words
 }
 
 /// A binary64 number for each lane of a vector of binary32.
@@ -276,7 +339,7 @@ impl<S: Simd> Wide<S> {
         Self(self.0 + other.0, self.1 + other.1)
     }
 
-    /// How far it is from each number to `place`.
+    /// The distance from each number to `place`.
     #[inline(always)]
     fn distance_to(self, simd: S, place: f64) -> Self {
         let place = S::f64s::splat(simd, place);
@@ -318,7 +381,7 @@ pub(super) fn reached_blocks<S: Simd>(
     least.simd_le(room.combine(room))
 }
 
-/// Of the `open` blocks of a tile, those that a Gaussian would be evaluated in if depths did not hide it.
+/// The number of `open` blocks of a tile in which a Gaussian would be evaluated if depths did not hide it.
 #[inline(always)]
 pub(super) fn hidden_blocks<S: Simd>(
     simd: S,

@@ -261,7 +261,7 @@ fn naive_sample(
         }
         let alpha = power(-fall).min(state.alpha_ceiling);
         out.reached = true;
-        if !passes(g.depth) {
+        if !passes(g.look.depth) {
             continue;
         }
         if needs_f64_sums(state) {
@@ -270,9 +270,9 @@ fn naive_sample(
                 break;
             }
             if wide_t >= 0.5 {
-                out.median = g.depth;
+                out.median = g.look.depth;
             }
-            for (c, color) in wide_c.iter_mut().zip(g.color) {
+            for (c, color) in wide_c.iter_mut().zip(g.look.color) {
                 *c += weight * f64::from(color);
             }
             wide_t -= weight;
@@ -286,9 +286,9 @@ fn naive_sample(
             break;
         }
         if t >= 0.5 {
-            out.median = g.depth;
+            out.median = g.look.depth;
         }
-        for (c, color) in c.iter_mut().zip(g.color) {
+        for (c, color) in c.iter_mut().zip(g.look.color) {
             *c = mul_add(weight, color, *c);
         }
         t = rest;

@@ -109,7 +109,7 @@ impl BlockKernel for Tracking<'_> {
         let fall = falls(simd, task, (batch, place), block);
         let mut reached = fall.simd_le(thresholds.most_fall);
         if thresholds.depth_mode > NO_DEPTH {
-            reached &= ranges.pixels(simd, block, splat.depth);
+            reached &= ranges.pixels(simd, block, splat.look.depth);
         }
         let mut reached = reached.to_bitmask() as u32 & self.open;
         if reached == 0 {
@@ -118,7 +118,7 @@ impl BlockKernel for Tracking<'_> {
         let ceiling = f32x16::splat(simd, thresholds.alpha_ceiling);
         let alphas = exp2_of_negated(simd, fall).min(ceiling).to_array();
         let floor = f64::from(thresholds.transmittance_floor);
-        let depth = f64::from(thresholds.depth_unit.decode(splat.depth));
+        let depth = f64::from(thresholds.depth_unit.decode(splat.look.depth));
         let identity = self.identities[batch][place];
         let mut accepted = 0;
         while reached != 0 {
@@ -134,7 +134,7 @@ impl BlockKernel for Tracking<'_> {
                 sum.finished = true;
                 continue;
             }
-            for (part, color) in sum.color.iter_mut().zip(splat.color) {
+            for (part, color) in sum.color.iter_mut().zip(splat.look.color) {
                 *part += weight * f64::from(color);
             }
             let [depths, distances, weights] = &mut sum.means;
@@ -146,7 +146,7 @@ impl BlockKernel for Tracking<'_> {
             }
             if sum.transmittance >= 0.5 {
                 sum.median = identity;
-                sum.depth = splat.depth;
+                sum.depth = splat.look.depth;
             }
             sum.transmittance = rest;
             sum.covered = true;

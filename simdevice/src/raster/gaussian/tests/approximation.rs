@@ -65,7 +65,7 @@ fn picture(device: &Device, count: u32, state: GaussianState) -> (Vec<Option<[f3
         .splats
         .iter()
         .flatten()
-        .flat_map(|splat| splat.color);
+        .flat_map(|splat| splat.look.color);
     let range = colors.fold(0.0, f32::max);
     let mut tile = Box::new(GaussianTile::default());
     let mut counters = Counters::default();

@@ -24,8 +24,8 @@ pub(super) fn naive_sample(
         );
         if alpha >= state.alpha_floor {
             out.reached = true;
-            if passes(g.depth) && pixel.add(&Splat16::new(g), alpha, &state) {
-                out.median = g.depth;
+            if passes(g.look.depth) && pixel.add(&Splat16::new(g), alpha, &state) {
+                out.median = g.look.depth;
             }
         }
     }

@@ -37,7 +37,7 @@ pub(super) fn naive_sample(
         }
         let alpha = power(-fall).min(state.alpha_ceiling);
         out.reached = true;
-        if passes(g.depth) {
+        if passes(g.look.depth) {
             let depth = &depths.of[batch][place];
             let along =
                 dispatch!(Level::baseline(), simd => depth.along(simd, &rays, 0).as_slice()[0]);
@@ -53,9 +53,9 @@ pub(super) fn naive_sample(
             break;
         }
         if t >= 0.5 {
-            out.median = g.depth;
+            out.median = g.look.depth;
         }
-        for (c, color) in c.iter_mut().zip(g.color) {
+        for (c, color) in c.iter_mut().zip(g.look.color) {
             *c += weight * f64::from(color);
         }
         t -= weight;

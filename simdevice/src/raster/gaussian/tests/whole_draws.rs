@@ -169,7 +169,7 @@ fn random_scene(seed: u64) -> Scene {
         .splats
         .iter()
         .flatten()
-        .map(|g| g.depth)
+        .map(|g| g.look.depth)
         .collect();
     let count = (96 * 64 * samples) as usize;
     let mut before = Picture {
