@@ -111,7 +111,8 @@ impl Device {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Looks at a command, and tells what is wrong with it. A panic goes no further: the command is passed on unchecked.
+    /// Looks at a command, and tells what is wrong with it. A panic goes no further: the command is passed on
+    /// unchecked.
     pub(crate) fn observe(&self, look: impl FnOnce(&mut State, &mut Faults)) {
         let mut faults = Faults::default();
         let looked = {

@@ -83,8 +83,8 @@ impl Link for DeviceLink {
 pub(crate) unsafe fn take_link<L: Link>(chain: *const c_void) -> Option<L> {
     let mut structure = chain.cast::<CreateInfo<L>>().cast_mut();
     while !structure.is_null() {
-        // SAFETY: every structure of a chain begins with its type and the next one's address; those of the holder's type are
-        // the loader's, which lets layers change them. Nothing but these members is touched in others.
+        // SAFETY: every structure of a chain begins with its type and the next one's address; those of the holder's
+        // type are the loader's, which lets layers change them. Nothing but these members is touched in others.
         unsafe {
             if (*structure).s_type == L::HOLDER
                 && (*structure).function == LINK
@@ -152,8 +152,8 @@ pub(crate) unsafe fn string<'a>(text: *const c_char) -> &'a CStr {
     unsafe { CStr::from_ptr(text) }
 }
 
-/// The loader's key of a dispatchable handle's chain: the address that its object begins with. Handles of one instance, and
-/// those of one device, have one key.
+/// The loader's key of a dispatchable handle's chain: the address that its object begins with. Handles of one
+/// instance, and those of one device, have one key.
 ///
 /// # Safety
 /// The handle is valid, and the loader has seen it.

@@ -1,8 +1,9 @@
-//! `VK_LAYER_GAURAST_validation`: a Vulkan layer that checks the use of `VK_GAURAST_gaussian_primitive_topology`, on any driver.
+//! `VK_LAYER_GAURAST_validation`: a Vulkan layer that checks the use of `VK_GAURAST_gaussian_primitive_topology`, on
+//! any driver.
 //!
-//! It says which rule of the extension's valid usage a command breaks, and warns of what is valid and surely not meant, such
-//! as logarithms where scales are wanted. Messages go to the application's debug-utils messengers, or to the standard error
-//! where there is none. Every command is passed on as it is.
+//! It says which rule of the extension's valid usage a command breaks, and warns of what is valid and surely not
+//! meant, such as logarithms where scales are wanted. Messages go to the application's debug-utils messengers, or to
+//! the standard error where there is none. Every command is passed on as it is.
 //!
 //! | module | has |
 //! |---|---|

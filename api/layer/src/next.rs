@@ -5,8 +5,8 @@ use std::ffi::CStr;
 use ash::vk;
 use gaurast::vk as gvk;
 
-/// Calls a macro with a row for each command that the layer intercepts: the name of its hook, its type, and its names, the
-/// promoted one first.
+/// Calls a macro with a row for each command that the layer intercepts: the name of its hook, its type, and its names,
+/// the promoted one first.
 macro_rules! device_commands {
     ($use:ident) => {
         $use! {

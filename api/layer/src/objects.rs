@@ -153,8 +153,8 @@ impl Objects {
         found.map(|(&handle, buffer)| (handle, buffer))
     }
 
-    /// Bytes of a buffer that the layer is sure of, as the device finds them if nothing else is written meanwhile. `map`
-    /// maps memory that the application has not mapped, and calls back.
+    /// Bytes of a buffer that the layer is sure of, as the device finds them if nothing else is written meanwhile.
+    /// `map` maps memory that the application has not mapped, and calls back.
     pub(crate) fn read(
         &self,
         handle: vk::Buffer,
@@ -179,8 +179,9 @@ impl Objects {
                     return None;
                 }
                 let from = address + usize::try_from(place - first).ok()?;
-                // SAFETY: the application has mapped these bytes, and unmaps them or frees the memory only by commands that wait
-                // for the lock that the caller holds. It may write them meanwhile: they are numbers, any of which is a value.
+                // SAFETY: the application has mapped these bytes, and unmaps them or frees the memory only by commands
+                // that wait for the lock that the caller holds. It may write them meanwhile: they are numbers, any of
+                // which is a value.
                 unsafe {
                     std::ptr::copy_nonoverlapping(from as *const u8, bytes.as_mut_ptr(), length);
                 };

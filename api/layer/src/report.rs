@@ -112,8 +112,8 @@ impl Messengers {
                 messenger.severity.contains(severity) && messenger.types.intersects(types);
             if let Some(callback) = messenger.callback.filter(|_| listens) {
                 let user_data = messenger.user_data as *mut c_void;
-                // SAFETY: the application gave the function and its pointer for such calls, and destroys the messenger before
-                // they go; the data are valid.
+                // SAFETY: the application gave the function and its pointer for such calls, and destroys the messenger
+                // before they go; the data are valid.
                 unsafe { callback(severity, types, &raw const data, user_data) };
             }
         }

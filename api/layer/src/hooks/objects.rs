@@ -99,7 +99,8 @@ creates! {
         let words = slice(info.p_code, count).to_vec();
         state.objects.modules.insert(module, Arc::new(words));
     }
-    create_descriptor_set_layout(info: vk::DescriptorSetLayoutCreateInfo<'_>, layout: vk::DescriptorSetLayout) |own, state| {
+    create_descriptor_set_layout(info: vk::DescriptorSetLayoutCreateInfo<'_>, layout: vk::DescriptorSetLayout)
+        |own, state| {
         let _ = &own;
         let bindings = slice(info.p_bindings, info.binding_count).iter();
         let mut known: Vec<_> = bindings

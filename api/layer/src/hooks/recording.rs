@@ -278,7 +278,8 @@ records! {
         let _ = &own;
         state.0.set_dynamic(vk::DynamicState::STENCIL_TEST_ENABLE, enable.to_ne_bytes());
     }
-    cmd_begin_render_pass(begin: *const vk::RenderPassBeginInfo<'_>, contents: vk::SubpassContents) |own, state, _faults| {
+    cmd_begin_render_pass(begin: *const vk::RenderPassBeginInfo<'_>, contents: vk::SubpassContents)
+        |own, state, _faults| {
         let _ = (&own, contents);
         begin_render_pass(state, &*begin);
     }
@@ -342,7 +343,8 @@ records! {
             rules::draw::check(state.0, call, state.1, &own.facts, faults);
         }
     }
-    cmd_draw_indexed_indirect(buffer: vk::Buffer, offset: vk::DeviceSize, count: u32, stride: u32) |own, state, faults| {
+    cmd_draw_indexed_indirect(buffer: vk::Buffer, offset: vk::DeviceSize, count: u32, stride: u32)
+        |own, state, faults| {
         let _ = stride;
         if count > 0 {
             let call = Call::Indirect(buffer, offset, true);
@@ -350,20 +352,23 @@ records! {
         }
     }
     cmd_draw_indirect_count(
-        buffer: vk::Buffer, offset: vk::DeviceSize, counts: vk::Buffer, count_offset: vk::DeviceSize, most: u32, stride: u32
+        buffer: vk::Buffer, offset: vk::DeviceSize, counts: vk::Buffer, count_offset: vk::DeviceSize,
+        most: u32, stride: u32
     ) |own, state, faults| {
         let _ = (counts, count_offset, most, stride);
         let call = Call::Indirect(buffer, offset, false);
         rules::draw::check(state.0, call, state.1, &own.facts, faults);
     }
     cmd_draw_indexed_indirect_count(
-        buffer: vk::Buffer, offset: vk::DeviceSize, counts: vk::Buffer, count_offset: vk::DeviceSize, most: u32, stride: u32
+        buffer: vk::Buffer, offset: vk::DeviceSize, counts: vk::Buffer, count_offset: vk::DeviceSize,
+        most: u32, stride: u32
     ) |own, state, faults| {
         let _ = (counts, count_offset, most, stride);
         let call = Call::Indirect(buffer, offset, true);
         rules::draw::check(state.0, call, state.1, &own.facts, faults);
     }
-    cmd_copy_buffer(from: vk::Buffer, to: vk::Buffer, count: u32, regions: *const vk::BufferCopy) |own, state, _faults| {
+    cmd_copy_buffer(from: vk::Buffer, to: vk::Buffer, count: u32, regions: *const vk::BufferCopy)
+        |own, state, _faults| {
         let _ = &own;
         let regions = slice(regions, count).to_vec();
         state.0.operations.push(Operation::Copy(from, to, regions));

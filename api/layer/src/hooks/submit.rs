@@ -210,8 +210,8 @@ impl Contents<'_> {
         let device = self.device.handle;
         let mut data: *mut c_void = std::ptr::null_mut();
         let flags = vk::MemoryMapFlags::empty();
-        // SAFETY: the memory lives, is mappable and not mapped, and the lock on what changes keeps the application from mapping
-        // it; the mapping is as long as its memory.
+        // SAFETY: the memory lives, is mappable and not mapped, and the lock on what changes keeps the application
+        // from mapping it; the mapping is as long as its memory.
         unsafe {
             if map(device, memory, 0, vk::WHOLE_SIZE, flags, &raw mut data) != vk::Result::SUCCESS {
                 return false;

@@ -153,7 +153,8 @@ fn check_rotation(rotation: &[f32; 9], name: &str, faults: &mut Faults) {
         faults.warning(
             "GAURAST-Camera-rotation",
             format!(
-                "{name}.rotation is {rotation:?}, which is not orthonormal (R Rᵀ is off by {worst}): its rows are the directions \
+                "{name}.rotation is {rotation:?}, which is not orthonormal (R Rᵀ is off by {worst}): its rows are \
+                     the directions \
                  right, down and forward of the picture in world space, without a scale or a projection"
             ),
         );

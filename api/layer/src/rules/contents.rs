@@ -53,8 +53,8 @@ pub(crate) fn check(draw: &Draw, reader: &dyn Reader, facts: &Facts, faults: &mu
     count(draw, &gaussians, cameras.first(), faults);
 }
 
-/// The cameras of a draw, as far as they are known; of those in a uniform buffer, the rules are checked. Without the buffer
-/// there are none.
+/// The cameras of a draw, as far as they are known; of those in a uniform buffer, the rules are checked. Without the
+/// buffer there are none.
 fn cameras(
     draw: &Draw,
     reader: &dyn Reader,
@@ -86,7 +86,8 @@ fn cameras(
     if range < count * element {
         faults.error(
             id,
-            format!("the descriptor of the camera has a range of {range} bytes, but must have {element} times cameraCount ({count})"),
+            format!("the descriptor of the camera has a range of {range} bytes, but must have {element} times \
+                 cameraCount ({count})"),
         );
         return None;
     }
@@ -350,7 +351,8 @@ fn indexed(
         faults.warning(
             "GAURAST-Draw-index-past-vertices",
             format!(
-                "{beyond} of {} indices name no Gaussian: with the vertex offset the greatest is {greatest}, and the vertex buffers \
+                "{beyond} of {} indices name no Gaussian: with the vertex offset the greatest is {greatest}, and the \
+                     vertex buffers \
                  hold {holds}",
                 vertices.len()
             ),
@@ -623,7 +625,8 @@ fn tell(draw: &Draw, counts: &Counts, total: u64, faults: &mut Faults) {
         faults.warning(
             "GAURAST-Draw-not-finite",
             format!(
-                "{} of {of} Gaussians have a position, scale, rotation, opacity, coefficient or matrix that is NaN or infinite, and are \
+                "{} of {of} Gaussians have a position, scale, rotation, opacity, coefficient or matrix that is NaN \
+                     or infinite, and are \
                  skipped{nothing}",
                 c.not_finite
             ),
@@ -642,7 +645,8 @@ fn tell(draw: &Draw, counts: &Counts, total: u64, faults: &mut Faults) {
         faults.warning(
             "GAURAST-Draw-negative-scale",
             format!(
-                "{} of {of} Gaussians have a negative scale, and are skipped{nothing}. Are they logarithms, as trained files hold \
+                "{} of {of} Gaussians have a negative scale, and are skipped{nothing}. Are they logarithms, as \
+                     trained files hold \
                  them? Set VK_PIPELINE_GAUSSIAN_STATE_CREATE_LOG_SCALE_BIT_GAURAST",
                 c.negative_scale
             ),
@@ -652,7 +656,8 @@ fn tell(draw: &Draw, counts: &Counts, total: u64, faults: &mut Faults) {
         faults.warning(
             "GAURAST-Draw-opacity-outside",
             format!(
-                "{} of {of} Gaussians have an opacity outside of 0 to 1. Are they logits, as trained files hold them? Set \
+                "{} of {of} Gaussians have an opacity outside of 0 to 1. Are they logits, as trained files hold \
+                     them? Set \
                  VK_PIPELINE_GAUSSIAN_STATE_CREATE_LOGIT_OPACITY_BIT_GAURAST",
                 c.opacity_outside
             ),
@@ -662,7 +667,8 @@ fn tell(draw: &Draw, counts: &Counts, total: u64, faults: &mut Faults) {
         faults.warning(
             "GAURAST-Draw-scale-twice",
             format!(
-                "all of {of} Gaussians have scales of 0 to 1 with LOG_SCALE, so that their standard deviations are 1 to 2.7: are they \
+                "all of {of} Gaussians have scales of 0 to 1 with LOG_SCALE, so that their standard deviations are 1 \
+                     to 2.7: are they \
                  standard deviations already?"
             ),
         );
@@ -671,7 +677,8 @@ fn tell(draw: &Draw, counts: &Counts, total: u64, faults: &mut Faults) {
         faults.warning(
             "GAURAST-Draw-opacity-twice",
             format!(
-                "all of {of} Gaussians have opacities of 0 to 1 with LOGIT_OPACITY, so that they are drawn with 0.5 to 0.73: are they \
+                "all of {of} Gaussians have opacities of 0 to 1 with LOGIT_OPACITY, so that they are drawn with 0.5 \
+                     to 0.73: are they \
                  opacities already?"
             ),
         );
@@ -681,7 +688,8 @@ fn tell(draw: &Draw, counts: &Counts, total: u64, faults: &mut Faults) {
         faults.warning(
             "GAURAST-Draw-quaternion-order",
             format!(
-                "the last component of the rotation is the greatest in {} of {of} Gaussians: are they x, y, z, w? The order is w, x, y, z",
+                "the last component of the rotation is the greatest in {} of {of} Gaussians: are they x, y, z, w? \
+                     The order is w, x, y, z",
                 c.last_is_greatest
             ),
         );
@@ -689,7 +697,8 @@ fn tell(draw: &Draw, counts: &Counts, total: u64, faults: &mut Faults) {
     if c.no_model_opacity == all {
         faults.warning(
             "GAURAST-Draw-model-opacity",
-            format!("modelOpacity is 0 for all of {of} Gaussians, so that nothing is drawn: without a factor it is 1, or unused"),
+            format!("modelOpacity is 0 for all of {of} Gaussians, so that nothing is drawn: without a factor it is \
+                 1, or unused"),
         );
     }
     if faults.0.len() > before || c.drawn > 0 {
@@ -736,7 +745,8 @@ fn tell_nothing(draw: &Draw, counts: &Counts, of: &str, faults: &mut Faults) {
         let hint = match *id {
             "GAURAST-Draw-opacity-floor" => "",
             _ => {
-                ". Camera axes are +x right, +y down, +z forward; the rows of rotation are these directions in the world"
+                ". Camera axes are +x right, +y down, +z forward; the rows of rotation are these directions in the \
+                     world"
             }
         };
         faults.warning(

@@ -68,7 +68,8 @@ pub(crate) fn check(
         faults.warning(
             "GAURAST-Device-no-features",
             "the extension is enabled, but the pNext chain of VkDeviceCreateInfo has no \
-             VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST: no feature is enabled, and no Gaussian can be drawn. \
+             VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST: no feature is enabled, and no Gaussian can be \
+             drawn. \
              If it was there, a layer above this one has dropped it: name this layer first, and tell \
              VK_LAYER_KHRONOS_validation of the extension's structures (docs/layer.md)",
         );

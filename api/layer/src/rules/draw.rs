@@ -109,7 +109,8 @@ fn with_dynamic(
         "VUID-vkCmdDraw-sphericalHarmonicsDegree-90061",
         || {
             format!(
-                "the dynamic sphericalHarmonicsDegree is {}, but the pipeline has coefficients of degree {stored_degree}",
+                "the dynamic sphericalHarmonicsDegree is {}, but the pipeline has coefficients of degree \
+                     {stored_degree}",
                 s.spherical_harmonics_degree
             )
         },
@@ -172,7 +173,8 @@ fn check_cameras(
     faults.require(
         view_mask == 0 || count == 1 || count >= views,
         "VUID-vkCmdDraw-cameraCount-90063",
-        || format!("there are {count} cameras, but the view mask is {view_mask:#b}: there must be 1, or at least {views}"),
+        || format!("there are {count} cameras, but the view mask is {view_mask:#b}: there must be 1, or at least \
+             {views}"),
     );
     let seen = if view_mask == 0 { 1 } else { cameras.len() };
     for camera in &cameras[..seen.min(cameras.len())] {
@@ -212,7 +214,8 @@ fn warn_of_units(camera: &Camera, [width, height]: [f32; 2], faults: &mut Faults
         faults.warning(
             "GAURAST-Draw-focal-length",
             format!(
-                "focalLength is {:?} with a viewport of {width} x {height}: its unit is the pixel, not the picture's side",
+                "focalLength is {:?} with a viewport of {width} x {height}: its unit is the pixel, not the picture's \
+                     side",
                 camera.focal_length
             ),
         );
@@ -220,7 +223,8 @@ fn warn_of_units(camera: &Camera, [width, height]: [f32; 2], faults: &mut Faults
         faults.warning(
             "GAURAST-Draw-principal-point",
             format!(
-                "principalPoint is {:?} with a viewport of {width} x {height}: it is in pixels from the upper left corner, and \
+                "principalPoint is {:?} with a viewport of {width} x {height}: it is in pixels from the upper left \
+                     corner, and \
                  mostly the middle",
                 camera.principal_point
             ),
@@ -234,7 +238,8 @@ fn check_harmonics(recording: &Recording, gaussian: &GaussianState, faults: &mut
     faults.require(
         !needs || recording.harmonics.is_some(),
         "VUID-vkCmdDraw-sphericalHarmonicsBuffer-90018",
-        || "flags has SPHERICAL_HARMONICS_BUFFER, but vkCmdBindGaussianSphericalHarmonicsGAURAST has bound no buffer".to_owned(),
+        || "flags has SPHERICAL_HARMONICS_BUFFER, but vkCmdBindGaussianSphericalHarmonicsGAURAST has bound no \
+             buffer".to_owned(),
     );
 }
 
@@ -299,7 +304,8 @@ fn check_ranges(
         faults.warning(
             "GAURAST-Draw-instances",
             format!(
-                "the draw has {instances} instances, but no attribute advances by instance: each Gaussian is drawn {instances} times \
+                "the draw has {instances} instances, but no attribute advances by instance: each Gaussian is drawn \
+                     {instances} times \
                  at one place. Number the Gaussians by vertexCount"
             ),
         );
@@ -403,7 +409,8 @@ fn check_vertices(
             return faults.warning(
                 "GAURAST-Draw-vertices-past-buffer",
                 format!(
-                    "the draw reads location {location} of {what} {first} to {last}, but the buffer of binding {number} holds {holds}"
+                    "the draw reads location {location} of {what} {first} to {last}, but the buffer of binding \
+                         {number} holds {holds}"
                 ),
             );
         }
@@ -427,7 +434,8 @@ fn check_blending(
     if pipeline.replaces && !pipeline.has_fragment && (is_loaded || is_drawn) {
         faults.warning(
             "GAURAST-Draw-blending-off",
-            "blending is off, and the attachment holds something before the draw (an earlier draw, or loadOp LOAD): Gaussians replace \
+            "blending is off, and the attachment holds something before the draw (an earlier draw, or loadOp LOAD): \
+                 Gaussians replace \
              it with their premultiplied colour. \"Over\" is ONE, ONE_MINUS_SRC_ALPHA",
         );
     }

@@ -7,7 +7,8 @@ use crate::formats::Format;
 use crate::objects::Objects;
 use crate::report::Faults;
 
-/// Checks the buffer of `vkCmdBindGaussianSphericalHarmonicsGAURAST`; `is_vertex_format` tells what formats can be fetched.
+/// Checks the buffer of `vkCmdBindGaussianSphericalHarmonicsGAURAST`; `is_vertex_format` tells what formats can be
+/// fetched.
 pub(crate) fn check(
     bound: &GaussianSphericalHarmonicsBufferGAURAST<'_>,
     objects: &Objects,

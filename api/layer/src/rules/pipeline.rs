@@ -277,7 +277,8 @@ fn check_attributes(gaussian: &GaussianState, request: &Request, faults: &mut Fa
         if let Some((other, ..)) = same {
             return faults.error(
                 "VUID-VkGaussianAttributeLocationsGAURAST-None-90019",
-                format!("{other} and {name} are the same location, {location}; members that are not used are ~0U, not 0"),
+                format!("{other} and {name} are the same location, {location}; members that are not used are ~0U, \
+                     not 0"),
             );
         }
     }
@@ -299,7 +300,8 @@ fn check_attributes(gaussian: &GaussianState, request: &Request, faults: &mut Fa
             return faults.error(
                 id,
                 format!(
-                    "{name} is location {location}, whose format is {:?}, but must have {components} components or more that \
+                    "{name} is location {location}, whose format is {:?}, but must have {components} components or \
+                         more that \
                      convert to floating point",
                     attribute.format
                 ),
@@ -339,7 +341,8 @@ fn check_camera(gaussian: &GaussianState, request: &Request, faults: &mut Faults
         });
         faults.require(fits, "VUID-VkPipelineGaussianStateCreateInfoGAURAST-cameraBinding-90025", || {
             format!(
-                "cameraSource is UNIFORM_BUFFER, but the layout has no uniform buffer visible to the vertex stage at set {set}, \
+                "cameraSource is UNIFORM_BUFFER, but the layout has no uniform buffer visible to the vertex stage at \
+                     set {set}, \
                  binding {number}"
             )
         });
@@ -348,7 +351,8 @@ fn check_camera(gaussian: &GaussianState, request: &Request, faults: &mut Faults
     let count = gaussian.camera_count;
     let id = "VUID-VkPipelineGaussianStateCreateInfoGAURAST-cameraCount-90026";
     faults.require(count == 1 || count >= views.max(1), id, || {
-        format!("cameraCount is {count}, but must be 1, or greater than the greatest view index, and not 0 (there are {views} views)")
+        format!("cameraCount is {count}, but must be 1, or greater than the greatest view index, and not 0 (there \
+             are {views} views)")
     });
 }
 
@@ -379,7 +383,8 @@ fn warn(gaussian: &GaussianState, request: &Request, faults: &mut Faults) {
         faults.warning(
             "GAURAST-Pipeline-alpha-ceiling",
             format!(
-                "alphaCeiling is {}, which is more than 1 less transmittanceFloor ({}): where the first Gaussian reaches it, \
+                "alphaCeiling is {}, which is more than 1 less transmittanceFloor ({}): where the first Gaussian \
+                     reaches it, \
                  nothing is drawn at all",
                 gaussian.alpha_ceiling, gaussian.transmittance_floor
             ),
@@ -420,7 +425,8 @@ fn warn_of_output(request: &Request, faults: &mut Faults) {
     if is_integer(format) {
         return faults.warning(
             "GAURAST-Pipeline-integer-attachment",
-            format!("the first colour attachment is {format:?}: without a fragment stage integer attachments are left as they are"),
+            format!("the first colour attachment is {format:?}: without a fragment stage integer attachments are \
+                 left as they are"),
         );
     }
     let Some(blend) = request.blend.first() else {

@@ -50,7 +50,8 @@ pub(crate) fn end(recording: &mut Recording, facts: &Facts, faults: &mut Faults)
 pub(crate) fn require_ended(recording: &mut Recording, command: &str, faults: &mut Faults) {
     let is_open = recording.set.take().is_some();
     faults.require(!is_open, "VUID-vkCmdBeginGaussianSetGAURAST-None-90003", || {
-        format!("{command} is recorded within a set: it must end in the subpass and the command buffer in which it has begun")
+        format!("{command} is recorded within a set: it must end in the subpass and the command buffer in which it \
+             has begun")
     });
 }
 

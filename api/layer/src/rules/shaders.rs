@@ -45,7 +45,8 @@ pub(crate) fn check_vertex(
             return faults.error(
                 id,
                 format!(
-                    "{name} is location {location}, at which the vertex shader must write {components} components of 32-bit \
+                    "{name} is location {location}, at which the vertex shader must write {components} components of \
+                         32-bit \
                      floating point, but does not"
                 ),
             );
@@ -76,7 +77,8 @@ pub(crate) fn check_fragment(
     if let Some((&(location, component), is_float)) = inputs.slots.iter().find(is_there) {
         let text = if *is_float {
             format!(
-                "the fragment shader reads component {component} of location {location}, where nothing is: accumulatedColor is \
+                "the fragment shader reads component {component} of location {location}, where nothing is: \
+                     accumulatedColor is \
                  location {}, and depth {}",
                 place(color),
                 place(depth)

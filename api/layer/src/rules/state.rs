@@ -1,5 +1,5 @@
-//! The Gaussian state by itself: the rules that a pipeline keeps when it is created, and again with the values of its dynamic
-//! states when it draws.
+//! The Gaussian state by itself: the rules that a pipeline keeps when it is created, and again with the values of its
+//! dynamic states when it draws.
 
 use gaurast::vk::{
     GAUSSIAN_LOCATION_UNUSED_GAURAST as UNUSED, GaussianAntialiasingGAURAST as Antialiasing,
@@ -156,7 +156,8 @@ fn check_combinations(state: &State, has_fragment: bool, faults: &mut Faults) {
     faults.require(
         fixed || s.order != Order::RADIAL_DISTANCE || s.vertex_output_locations.depth_key != UNUSED,
         "VUID-VkPipelineGaussianStateCreateInfoGAURAST-depthKey-90021",
-        || "order is RADIAL_DISTANCE with vertex-shader projection, but depthKey is unused: a shader must write the distance".to_owned(),
+        || "order is RADIAL_DISTANCE with vertex-shader projection, but depthKey is unused: a shader must write the \
+             distance".to_owned(),
     );
     faults.require(
         fixed || !is_per_pixel,
@@ -185,13 +186,18 @@ fn check_combinations(state: &State, has_fragment: bool, faults: &mut Faults) {
     faults.require(
         !is_half || fixed && !is_flat && !is_per_pixel,
         "VUID-VkPipelineGaussianStateCreateInfoGAURAST-precision-90030",
-        || "precision is FLOAT16, but that needs GAUSSIAN_3D, an order other than PER_PIXEL, and FIXED_FUNCTION".to_owned(),
+        || {
+            "precision is FLOAT16, but that needs GAUSSIAN_3D, an order other than PER_PIXEL, and \
+             FIXED_FUNCTION"
+                .to_owned()
+        },
     );
     let has_depth = s.resolve_input_locations.depth != UNUSED;
     faults.require(
         !has_fragment || !has_depth || !is_half && !is_per_pixel,
         "VUID-VkGaussianResolveInputLocationsGAURAST-depth-90031",
-        || "the depth of resolveInputLocations is used, but no depths are accumulated with FLOAT16 or PER_PIXEL".to_owned(),
+        || "the depth of resolveInputLocations is used, but no depths are accumulated with FLOAT16 or \
+             PER_PIXEL".to_owned(),
     );
 }
 
