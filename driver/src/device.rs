@@ -487,7 +487,7 @@ mod tests {
             counts,
             [
                 39, 7, 43, 14, 1, 1, 1, 2, 1, 1, 2, 2, 2, 2, 1, 1, 2, 2, 1, 3, 6, 3, 4, 1, 14, 1,
-                1, 1, 1, 23
+                1, 1, 1, 26
             ]
         );
         assert_eq!(count_of(&SUPPORTED), counts.iter().sum::<usize>());

@@ -37,12 +37,16 @@ pub fn mistakes() -> Vec<Mistake> {
         set("a model that is none", model, || {
             vec![camera().model(GaussianCameraModelGAURAST::from_raw(77))]
         }),
-        mistake("a fisheye without its feature", model, |stage| {
-            recording(&stage.bare, |commands| {
-                let fisheye = camera().model(GaussianCameraModelGAURAST::FISHEYE);
-                commands.camera(&fisheye);
-            })
-        }),
+        mistake(
+            "a fisheye without its feature",
+            "VUID-VkGaussianCameraGAURAST-model-90079",
+            |stage| {
+                recording(&stage.bare, |commands| {
+                    let fisheye = camera().model(GaussianCameraModelGAURAST::FISHEYE);
+                    commands.camera(&fisheye);
+                })
+            },
+        ),
         set(
             "a rotation that is NaN",
             "VUID-VkGaussianCameraGAURAST-rotation-90064",

@@ -2,13 +2,13 @@
 
 use ash::vk;
 use gaurast::vk::{
-    GaussianAntialiasingGAURAST, GaussianCameraSourceGAURAST, GaussianGeometryGAURAST,
-    GaussianLinearizationGAURAST, GaussianOrderGAURAST, GaussianPrecisionGAURAST,
-    PipelineGaussianStateCreateFlagsGAURAST as Flags,
+    GaussianAntialiasingGAURAST, GaussianCameraSourceGAURAST, GaussianCutOffGAURAST,
+    GaussianGeometryGAURAST, GaussianLinearizationGAURAST, GaussianOrderGAURAST,
+    GaussianPrecisionGAURAST, PipelineGaussianStateCreateFlagsGAURAST as Flags,
 };
 use gaurast_testkit::{Bindings, Buffer, Graphics, Resource};
 
-use crate::pipelines::allowing;
+use crate::pipelines::{allowing, footprint};
 use crate::stage::{
     Mistake, State, creation, instanced, laid_out, mistake, pipeline, resolved, shaded, spirv,
     splats, with,
@@ -92,6 +92,16 @@ fn of_states() -> Vec<Mistake> {
             || allowing(1e-3, 0.0),
         ),
         bare(
+            "a cut-off without its feature",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianCutOff-90074",
+            || footprint(GaussianCutOffGAURAST::ELLIPSE, 3.0, 0.0),
+        ),
+        bare(
+            "a floor of compensation without its feature",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-opacityCompensationFloor-90075",
+            || footprint(GaussianCutOffGAURAST::NONE, 0.0, 0.1),
+        ),
+        bare(
             "model matrices without their feature",
             "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianInstancing-90043",
             instanced,
@@ -116,6 +126,18 @@ fn of_shaders_and_sets() -> Vec<Mistake> {
                 let request = resolved(spirv!("toned.frag"), [2, 5], |s| s);
                 let (request, _set, _buffer) = laid_out(&stage.bare, request);
                 creation(&stage.bare, &request)
+            },
+        ),
+        mistake(
+            "a Gaussian's index in a resolve shader without its feature",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-resolveGaussianIndices-90073",
+            |stage| {
+                let request = resolved(spirv!("toned.frag"), [2, 5], |mut s| {
+                    s.resolve_input_locations.nearest_gaussian = 6;
+                    s
+                });
+                let (request, _set, _buffer) = laid_out(&stage.resolving, request);
+                creation(&stage.resolving, &request)
             },
         ),
         mistake(

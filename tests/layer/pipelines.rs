@@ -2,10 +2,11 @@
 
 use ash::vk;
 use gaurast::vk::{
-    GaussianAntialiasingGAURAST, GaussianCameraSourceGAURAST, GaussianGeometryGAURAST,
-    GaussianLinearizationGAURAST, GaussianOrderGAURAST, GaussianPrecisionGAURAST,
-    GaussianProjectionModeGAURAST, PipelineGaussianApproximationStateCreateInfoGAURAST,
-    PipelineGaussianStateCreateFlagsGAURAST,
+    GaussianAntialiasingGAURAST, GaussianCameraSourceGAURAST, GaussianCutOffGAURAST,
+    GaussianGeometryGAURAST, GaussianLinearizationGAURAST, GaussianOrderGAURAST,
+    GaussianPrecisionGAURAST, GaussianProjectionModeGAURAST,
+    PipelineGaussianApproximationStateCreateInfoGAURAST,
+    PipelineGaussianFootprintStateCreateInfoGAURAST, PipelineGaussianStateCreateFlagsGAURAST,
 };
 use gaurast_testkit::{Bindings, Buffer, Graphics, Resource, Shader, blend};
 
@@ -19,6 +20,22 @@ pub fn allowing(exponential_error: f32, contribution_budget: f32) -> Graphics<'s
         .contribution_budget(contribution_budget);
     Graphics {
         approximation: Some(approximation),
+        ..splats()
+    }
+}
+
+/// A pipeline with a footprint state.
+pub fn footprint(
+    cut_off: GaussianCutOffGAURAST,
+    cut_off_deviations: f32,
+    compensation_floor: f32,
+) -> Graphics<'static> {
+    let footprint = PipelineGaussianFootprintStateCreateInfoGAURAST::default()
+        .cut_off(cut_off)
+        .cut_off_deviations(cut_off_deviations)
+        .compensation_floor(compensation_floor);
+    Graphics {
+        footprint: Some(footprint),
         ..splats()
     }
 }
@@ -59,7 +76,6 @@ pub fn mistakes() -> Vec<Mistake> {
 
 fn structures() -> Vec<Mistake> {
     let stages = "VUID-VkGraphicsPipelineCreateInfo-projectionMode-90008";
-    let parameter = "VUID-VkPipelineGaussianStateCreateInfoGAURAST-parameter";
     vec![
         mistake(
             "a pipeline on a device on which the topology is not enabled",
@@ -104,15 +120,21 @@ fn structures() -> Vec<Mistake> {
             let stage = vk::ShaderStageFlags::GEOMETRY;
             splats().with_shader(Shader::new(stage, spirv!("gaussian.vert")))
         }),
-        pipeline("an order that is none", parameter, || {
-            with(|s| s.order(GaussianOrderGAURAST::from_raw(77)))
-        }),
-        pipeline("a geometry that is none", parameter, || {
-            with(|s| s.geometry(GaussianGeometryGAURAST::from_raw(-1)))
-        }),
-        pipeline("a flag that is none", parameter, || {
-            with(|s| s.flags(PipelineGaussianStateCreateFlagsGAURAST::from_raw(0x100)))
-        }),
+        pipeline(
+            "an order that is none",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-order-parameter",
+            || with(|s| s.order(GaussianOrderGAURAST::from_raw(77))),
+        ),
+        pipeline(
+            "a geometry that is none",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-geometry-parameter",
+            || with(|s| s.geometry(GaussianGeometryGAURAST::from_raw(-1))),
+        ),
+        pipeline(
+            "a flag that is none",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-flags-parameter",
+            || with(|s| s.flags(PipelineGaussianStateCreateFlagsGAURAST::from_raw(0x100))),
+        ),
     ]
 }
 
@@ -153,6 +175,29 @@ fn numbers() -> Vec<Mistake> {
             "a budget of contributions that is NaN",
             "VUID-VkPipelineGaussianApproximationStateCreateInfoGAURAST-contributionBudget-90052",
             || allowing(0.0, f32::NAN),
+        ),
+        pipeline(
+            "a cut-off at no deviations",
+            "VUID-VkPipelineGaussianFootprintStateCreateInfoGAURAST-cutOffDeviations-90076",
+            || footprint(GaussianCutOffGAURAST::ELLIPSE, 0.0, 0.0),
+        ),
+        pipeline(
+            "a floor of compensation above 1",
+            "VUID-VkPipelineGaussianFootprintStateCreateInfoGAURAST-compensationFloor-90077",
+            || footprint(GaussianCutOffGAURAST::NONE, 0.0, 1.5),
+        ),
+        pipeline(
+            "a cut-off that is none",
+            "VUID-VkPipelineGaussianFootprintStateCreateInfoGAURAST-cutOff-parameter",
+            || footprint(GaussianCutOffGAURAST::from_raw(77), 3.0, 0.0),
+        ),
+        pipeline(
+            "a cut-off in binary16",
+            "VUID-VkPipelineGaussianFootprintStateCreateInfoGAURAST-cutOff-90078",
+            || Graphics {
+                gaussian: with(|s| s.precision(GaussianPrecisionGAURAST::FLOAT16)).gaussian,
+                ..footprint(GaussianCutOffGAURAST::ELLIPSE, 3.0, 0.0)
+            },
         ),
         state(
             "an alpha ceiling of 1 with a transmittance floor",

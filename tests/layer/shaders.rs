@@ -2,7 +2,9 @@
 
 use gaurast::vk::{
     GAUSSIAN_LOCATION_UNUSED_GAURAST as UNUSED, GaussianOrderGAURAST, GaussianPrecisionGAURAST,
+    GaussianResolveInputLocationsGAURAST,
 };
+use gaurast_testkit::Shader;
 
 use crate::stage::{Mistake, outputs, resolved, shaded, shaders, spirv};
 
@@ -31,6 +33,18 @@ pub fn mistakes() -> Vec<Mistake> {
                     s.order(by_distance)
                         .vertex_output_locations(outputs().depth_key(UNUSED))
                 })
+            },
+        ),
+        shaders(
+            "a camera in a resolve shader of what a shader projects",
+            "VUID-VkGaussianResolveInputLocationsGAURAST-firstCamera-90072",
+            || {
+                let locations = GaussianResolveInputLocationsGAURAST::default()
+                    .accumulated_color(2)
+                    .depth(5)
+                    .first_camera(8);
+                let request = shaded(|s| s.resolve_input_locations(locations));
+                request.with_shader(Shader::fragment(spirv!("toned.frag")))
             },
         ),
         shaders(

@@ -21,6 +21,8 @@ pub struct Stage {
     pub full: Gpu,
     /// Without the optional modes of the extension.
     pub bare: Gpu,
+    /// With fragment stages as the only optional feature.
+    pub resolving: Gpu,
     /// Without the topology.
     pub without: Gpu,
 }
@@ -40,6 +42,11 @@ impl Stage {
         let stage = Self {
             full: open(None),
             bare: open(Some(Features::default().gaussian_primitive_topology(true))),
+            resolving: open(Some(
+                Features::default()
+                    .gaussian_primitive_topology(true)
+                    .resolve_fragment_shader(true),
+            )),
             without: open(Some(Features::default())),
         };
         // That nothing is enabled was said.

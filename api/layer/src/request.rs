@@ -5,8 +5,9 @@ use std::sync::Arc;
 
 use ash::vk;
 use gaurast::vk::{
-    PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST, PipelineGaussianApproximationStateCreateInfoGAURAST,
-    PipelineGaussianStateCreateInfoGAURAST,
+    GaussianCutOffGAURAST, PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST,
+    PipelineGaussianApproximationStateCreateInfoGAURAST,
+    PipelineGaussianFootprintStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 
 use crate::facts::GaussianState;
@@ -20,12 +21,21 @@ pub(crate) struct Stage {
     pub(crate) entry: Vec<u8>,
 }
 
+/// The footprint state, or its defaults.
+#[derive(Clone, Copy)]
+pub(crate) struct Footprint {
+    pub(crate) cut_off: GaussianCutOffGAURAST,
+    pub(crate) cut_off_deviations: f32,
+    pub(crate) compensation_floor: f32,
+}
+
 /// What a graphics pipeline is asked to be.
 pub(crate) struct Request {
     pub(crate) draws_gaussians: bool,
     pub(crate) restart: bool,
     pub(crate) gaussian: Option<GaussianState>,
     pub(crate) approximation: Option<[f32; 2]>,
+    pub(crate) footprint: Option<Footprint>,
     pub(crate) stages: Vec<Stage>,
     /// By binding and by location; `None` where the vertex input is dynamic.
     pub(crate) vertex_input: Option<(BTreeMap<u32, VertexBinding>, BTreeMap<u32, Attribute>)>,
@@ -71,6 +81,8 @@ impl Request {
             let blend = info.p_color_blend_state.as_ref();
             let approximation =
                 find::<PipelineGaussianApproximationStateCreateInfoGAURAST<'_>>(info.p_next);
+            let footprint =
+                find::<PipelineGaussianFootprintStateCreateInfoGAURAST<'_>>(info.p_next);
             let gaussian = find::<PipelineGaussianStateCreateInfoGAURAST<'_>>(info.p_next);
             let stages = slice(info.p_stages, info.stage_count);
             let is_dynamic = |state: &vk::DynamicState| dynamic.contains(state);
@@ -88,6 +100,11 @@ impl Request {
                 gaussian: gaussian.map(GaussianState::of),
                 approximation: approximation
                     .map(|numbers| [numbers.exponential_error, numbers.contribution_budget]),
+                footprint: footprint.map(|state| Footprint {
+                    cut_off: state.cut_off,
+                    cut_off_deviations: state.cut_off_deviations,
+                    compensation_floor: state.compensation_floor,
+                }),
                 stages: stages
                     .iter()
                     .map(|stage| read_stage(stage, objects))

@@ -137,7 +137,7 @@ fn check_model(model: Model, name: &str, facts: &Facts, faults: &mut Faults) {
     let (feature, is_on) = feature;
     faults.require(
         is_on != 0,
-        "VUID-VkGaussianCameraGAURAST-model-parameter",
+        "VUID-VkGaussianCameraGAURAST-model-90079",
         || format!("{name}.model is {model:?}, but the feature {feature} is not enabled"),
     );
 }

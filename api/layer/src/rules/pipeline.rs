@@ -3,14 +3,15 @@
 use ash::vk;
 use gaurast::vk::{
     self as gvk, GAUSSIAN_LOCATION_UNUSED_GAURAST as UNUSED, GaussianAntialiasingGAURAST,
-    GaussianCameraSourceGAURAST as CameraSource, GaussianGeometryGAURAST as Geometry,
-    GaussianOrderGAURAST, PipelineGaussianStateCreateFlagsGAURAST as Flags,
+    GaussianCameraSourceGAURAST as CameraSource, GaussianCutOffGAURAST as CutOff,
+    GaussianGeometryGAURAST as Geometry, GaussianOrderGAURAST, GaussianPrecisionGAURAST,
+    PipelineGaussianStateCreateFlagsGAURAST as Flags,
 };
 
 use crate::facts::{Facts, GaussianState};
 use crate::formats::{Format, is_integer};
 use crate::report::Faults;
-use crate::request::Request;
+use crate::request::{Footprint, Request};
 use crate::rules::{shaders, state};
 use crate::spirv::{INPUT, Interface, OUTPUT};
 
@@ -56,6 +57,9 @@ pub(crate) fn check(request: &Request, facts: &Facts, faults: &mut Faults) {
     check_stages(&gaussian, request, facts, faults);
     check_fixed_function(request, faults);
     check_gates(request, facts, faults);
+    if let Some(footprint) = &request.footprint {
+        check_footprint(&gaussian, footprint, facts, faults);
+    }
     if state::is_fixed(&gaussian) {
         let before = faults.0.len();
         check_degree(&gaussian, facts, faults);
@@ -139,6 +143,17 @@ fn check_stages(gaussian: &GaussianState, request: &Request, facts: &Facts, faul
         if facts.features.resolve_fragment_shader == 0 {
             return faults.error(id, state::absent(id));
         }
+        let locations = &gaussian.resolve_input_locations;
+        let indices = [locations.median_gaussian, locations.nearest_gaussian];
+        let reads_indices = indices.iter().any(|&location| location != UNUSED);
+        let id = "VUID-VkPipelineGaussianStateCreateInfoGAURAST-resolveGaussianIndices-90073";
+        let has_indices = facts.features.resolve_gaussian_indices != 0;
+        faults.require(!reads_indices || has_indices, id, || state::absent(id));
+        faults.require(
+            fixed || locations.first_camera == UNUSED,
+            "VUID-VkGaussianResolveInputLocationsGAURAST-firstCamera-90072",
+            || "firstCamera is used with vertex-shader projection, which has no camera".to_owned(),
+        );
         let inputs = interface(Stage::FRAGMENT, INPUT);
         shaders::check_fragment(&gaussian.resolve_input_locations, inputs.as_ref(), faults);
     }
@@ -211,6 +226,59 @@ fn check_gates(request: &Request, facts: &Facts, faults: &mut Faults) {
     faults.require(!has_views || features.gaussian_multiview != 0, id, || {
         state::absent(id)
     });
+}
+
+/// Checks the footprint state.
+fn check_footprint(
+    gaussian: &GaussianState,
+    footprint: &Footprint,
+    facts: &Facts,
+    faults: &mut Faults,
+) {
+    let &Footprint {
+        cut_off,
+        cut_off_deviations: deviations,
+        compensation_floor: floor,
+    } = footprint;
+    let known = [
+        CutOff::NONE,
+        CutOff::ELLIPSE,
+        CutOff::TILE_SQUARE,
+        CutOff::TILE_RECTANGLE,
+    ];
+    if !known.contains(&cut_off) {
+        return faults.error(
+            "VUID-VkPipelineGaussianFootprintStateCreateInfoGAURAST-cutOff-parameter",
+            format!(
+                "cutOff is {}, which is no value of its type",
+                cut_off.as_raw()
+            ),
+        );
+    }
+    let cuts = cut_off != CutOff::NONE;
+    faults.require(
+        !cuts || deviations.is_finite() && deviations > 0.0,
+        "VUID-VkPipelineGaussianFootprintStateCreateInfoGAURAST-cutOffDeviations-90076",
+        || format!("cutOffDeviations is {deviations}, but must be finite and greater than 0"),
+    );
+    faults.require(
+        (0.0..=1.0).contains(&floor),
+        "VUID-VkPipelineGaussianFootprintStateCreateInfoGAURAST-compensationFloor-90077",
+        || format!("compensationFloor is {floor}, but must be in [0, 1]"),
+    );
+    let is_flat = state::is_fixed(gaussian) && gaussian.geometry == Geometry::GAUSSIAN_2D;
+    faults.require(
+        !cuts || gaussian.precision == GaussianPrecisionGAURAST::FLOAT32 && !is_flat,
+        "VUID-VkPipelineGaussianFootprintStateCreateInfoGAURAST-cutOff-90078",
+        || format!("cutOff is {cut_off:?}, but that needs FLOAT32 and GAUSSIAN_3D"),
+    );
+    let id = "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianCutOff-90074";
+    faults.require(!cuts || facts.features.gaussian_cut_off != 0, id, || {
+        state::absent(id)
+    });
+    let id = "VUID-VkPipelineGaussianStateCreateInfoGAURAST-opacityCompensationFloor-90075";
+    let has_floor = facts.features.opacity_compensation_floor != 0;
+    faults.require(floor == 0.0 || has_floor, id, || state::absent(id));
 }
 
 fn check_degree(gaussian: &GaussianState, facts: &Facts, faults: &mut Faults) {

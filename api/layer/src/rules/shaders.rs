@@ -61,32 +61,52 @@ pub(crate) fn check_fragment(
     faults: &mut Faults,
 ) {
     let id = "VUID-VkGaussianResolveInputLocationsGAURAST-None-90023";
-    let (color, depth) = (locations.accumulated_color, locations.depth);
-    if color == depth && color != UNUSED {
-        return faults.error(
-            id,
-            format!("accumulatedColor and depth are the same location, {color}"),
-        );
+    let inputs_of_text = resolve_inputs(locations);
+    for (index, one) in inputs_of_text.iter().enumerate() {
+        let overlaps = |other: &&ResolveInput| {
+            one.first < other.first + other.count && other.first < one.first + one.count
+        };
+        if let Some(other) = inputs_of_text[..index].iter().find(overlaps) {
+            return faults.error(
+                id,
+                format!(
+                    "{} and {} have the same location, {}",
+                    other.name,
+                    one.name,
+                    one.first.max(other.first)
+                ),
+            );
+        }
     }
     let Some(inputs) = inputs else { return };
-    let is_there = |&(&(location, component), &is_float): &(&(u32, u32), &bool)| {
-        let is_color = location == color && component < 4;
-        let is_depth = location == depth && component < 2;
-        !(is_float && (is_color || is_depth))
-    };
-    if let Some((&(location, component), is_float)) = inputs.slots.iter().find(is_there) {
-        let text = if *is_float {
-            format!(
+    for (&(location, component), &is_float) in &inputs.slots {
+        let location_of = u64::from(location);
+        let input = inputs_of_text
+            .iter()
+            .find(|input| (input.first..input.first + input.count).contains(&location_of));
+        let text = match input {
+            Some(input) if component >= input.components => format!(
+                "the fragment shader reads component {component} of location {location}, but {} has {} components",
+                input.name, input.components
+            ),
+            Some(input) if is_float != input.is_float => {
+                let kind = if input.is_float {
+                    "32-bit floating point"
+                } else {
+                    "32-bit unsigned integers"
+                };
+                format!(
+                    "the fragment shader reads location {location}, {}, as something other than {kind}",
+                    input.name
+                )
+            }
+            Some(_) => continue,
+            None => format!(
                 "the fragment shader reads component {component} of location {location}, where nothing is: \
-                     accumulatedColor is \
-                 location {}, and depth {}",
-                place(color),
-                place(depth)
-            )
-        } else {
-            format!(
-                "the fragment shader reads location {location} as something other than 32-bit floating point"
-            )
+                 accumulatedColor is location {}, and depth {}",
+                place(locations.accumulated_color),
+                place(locations.depth)
+            ),
         };
         return faults.error(id, text);
     }
@@ -95,6 +115,38 @@ pub(crate) fn check_fragment(
         "VUID-VkGraphicsPipelineCreateInfo-FragDepth-90024",
         || "the fragment shader writes FragDepth, but depths are those of Gaussians".to_owned(),
     );
+}
+
+/// An input that a resolve shader may read.
+struct ResolveInput {
+    name: &'static str,
+    first: u64,
+    /// The number of locations.
+    count: u64,
+    /// The number of components at each.
+    components: u32,
+    is_float: bool,
+}
+
+/// The inputs that the locations name.
+fn resolve_inputs(locations: &GaussianResolveInputLocationsGAURAST) -> Vec<ResolveInput> {
+    let inputs = [
+        ("accumulatedColor", locations.accumulated_color, 1, 4, true),
+        ("depth", locations.depth, 1, 2, true),
+        ("linearDepth", locations.linear_depth, 1, 2, true),
+        ("medianGaussian", locations.median_gaussian, 1, 2, false),
+        ("nearestGaussian", locations.nearest_gaussian, 1, 2, false),
+        ("firstCamera", locations.first_camera, 6, 4, true),
+    ];
+    let used = inputs.into_iter().filter(|input| input.1 != UNUSED);
+    used.map(|(name, first, count, components, is_float)| ResolveInput {
+        name,
+        first: first.into(),
+        count,
+        components,
+        is_float,
+    })
+    .collect()
 }
 
 fn place(location: u32) -> String {

@@ -24,53 +24,58 @@ pub(crate) fn is_fixed(state: &State) -> bool {
 pub(crate) fn check_enums(state: &State, faults: &mut Faults) -> bool {
     let known = Flags::LOG_SCALE | Flags::LOGIT_OPACITY | Flags::SPHERICAL_HARMONICS_BUFFER;
     let (fixed, shader) = (Projection::FIXED_FUNCTION, Projection::VERTEX_SHADER);
-    let is = |holds: bool, name: &'static str, raw: i32| (!holds).then_some((name, raw));
+    let is = |holds: bool, id: &'static str, raw: i32| (!holds).then_some((id, raw));
     let s = state;
     let wrong = [
         is(
             s.projection_mode == fixed || s.projection_mode == shader,
-            "projectionMode",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-projectionMode-parameter",
             s.projection_mode.as_raw(),
         ),
         is(
             s.geometry == Geometry::GAUSSIAN_3D || s.geometry == Geometry::GAUSSIAN_2D,
-            "geometry",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-geometry-parameter",
             s.geometry.as_raw(),
         ),
         is(
             s.linearization == Linearization::JACOBIAN
                 || s.linearization == Linearization::UNSCENTED,
-            "linearization",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-linearization-parameter",
             s.linearization.as_raw(),
         ),
-        is(is_order(s.order), "order", s.order.as_raw()),
+        is(
+            is_order(s.order),
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-order-parameter",
+            s.order.as_raw(),
+        ),
         is(
             s.precision == Precision::FLOAT32 || s.precision == Precision::FLOAT16,
-            "precision",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-precision-parameter",
             s.precision.as_raw(),
         ),
         is(
             is_antialiasing(s.antialiasing),
-            "antialiasing",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-antialiasing-parameter",
             s.antialiasing.as_raw(),
         ),
         is(
             s.camera_source == CameraSource::COMMAND
                 || s.camera_source == CameraSource::UNIFORM_BUFFER,
-            "cameraSource",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-cameraSource-parameter",
             s.camera_source.as_raw(),
         ),
         is(
             known.contains(s.flags),
-            "flags",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-flags-parameter",
             s.flags.as_raw().cast_signed(),
         ),
     ];
     match wrong.into_iter().flatten().next() {
         None => true,
-        Some((name, raw)) => {
+        Some((id, raw)) => {
+            let name = id.split('-').nth(2).unwrap_or(id);
             faults.error(
-                "VUID-VkPipelineGaussianStateCreateInfoGAURAST-parameter",
+                id,
                 format!("{name} is {raw}, which is no value of its type"),
             );
             false
@@ -192,13 +197,23 @@ fn check_combinations(state: &State, has_fragment: bool, faults: &mut Faults) {
                 .to_owned()
         },
     );
-    let has_depth = s.resolve_input_locations.depth != UNUSED;
-    faults.require(
-        !has_fragment || !has_depth || !is_half && !is_per_pixel,
-        "VUID-VkGaussianResolveInputLocationsGAURAST-depth-90031",
-        || "the depth of resolveInputLocations is used, but no depths are accumulated with FLOAT16 or \
-             PER_PIXEL".to_owned(),
-    );
+    let inputs = &s.resolve_input_locations;
+    let kept = [
+        ("depth", inputs.depth),
+        ("linearDepth", inputs.linear_depth),
+        ("medianGaussian", inputs.median_gaussian),
+        ("nearestGaussian", inputs.nearest_gaussian),
+    ];
+    let used = kept.iter().find(|(_, location)| *location != UNUSED);
+    if let Some((name, _)) = used.filter(|_| has_fragment && (is_half || is_per_pixel)) {
+        faults.error(
+            "VUID-VkGaussianResolveInputLocationsGAURAST-depth-90031",
+            format!(
+                "the {name} of resolveInputLocations is used, but neither depths nor Gaussians are kept with FLOAT16 or \
+                 PER_PIXEL"
+            ),
+        );
+    }
 }
 
 /// The features of modes that are used.
