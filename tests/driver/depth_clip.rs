@@ -7,16 +7,15 @@ use gaurast_testkit::{
 
 use crate::GLSLANG;
 
-/// The depth that a fragment shader gets for a triangle that covers the target at depth `z`; `None` if it is clipped.
-fn depth_seen(gpu: &Gpu, clamp: bool, clip: Option<bool>, z: f32) -> Option<f32> {
-    let mut state = vk::PipelineRasterizationDepthClipStateCreateInfoEXT::default()
-        .depth_clip_enable(clip.unwrap_or(false));
-    let mut raster = vk::PipelineRasterizationStateCreateInfo::default()
-        .line_width(1.0)
-        .depth_clamp_enable(clamp);
-    if clip.is_some() {
-        raster.p_next = std::ptr::from_mut(&mut state).cast();
-    }
+/// The red of a target that a triangle covers, at depth `z` with a w of `w` and in a viewport with these depths; `None` if it is
+/// clipped.
+fn red_of_triangle(
+    gpu: &Gpu,
+    options: &PipelineOptions<'_>,
+    z: f32,
+    w: f32,
+    viewport_depths: [f32; 2],
+) -> Option<f32> {
     let target = Target::new(
         gpu,
         &TargetOptions {
@@ -24,21 +23,9 @@ fn depth_seen(gpu: &Gpu, clamp: bool, clip: Option<bool>, z: f32) -> Option<f32>
             ..TargetOptions::of(vk::Format::R32_SFLOAT)
         },
     );
-    let options = PipelineOptions {
-        vertex: "layout(location = 0) in vec4 position;
-                 layout(location = 0) out float depth;
-                 void main() { gl_Position = position; depth = position.z; }",
-        fragment: Some(
-            "layout(location = 0) in float depth;
-             layout(location = 0) out vec4 color;
-             void main() { color = vec4(depth); }",
-        ),
-        raster,
-        ..PipelineOptions::default()
-    };
-    let pipeline = Pipeline::new(gpu, &target, &options);
+    let pipeline = Pipeline::new(gpu, &target, options);
     let vertex = |x: f32, y: f32| Vertex {
-        position: [x, y, z, 1.0],
+        position: [w * x, w * y, w * z, w],
         color: [0.0; 4],
     };
     let vertices = Buffer::of(
@@ -54,6 +41,7 @@ fn depth_seen(gpu: &Gpu, clamp: bool, clip: Option<bool>, z: f32) -> Option<f32>
     gpu.run(|commands| {
         commands.pass(&target, &pass, || {
             commands.bind(&pipeline);
+            commands.viewport([0.0, 0.0, 4.0, 4.0], viewport_depths);
             commands.vertices(&vertices);
             commands.draw(0..3);
         });
@@ -62,6 +50,31 @@ fn depth_seen(gpu: &Gpu, clamp: bool, clip: Option<bool>, z: f32) -> Option<f32>
         bytemuck::pod_collect_to_vec(&target.colors[0].read(vk::ImageAspectFlags::COLOR, 4));
     assert!(found.iter().all(|depth| depth == &found[0]), "{found:?}");
     (found[0] != 100.0).then_some(found[0])
+}
+
+/// The depth that a fragment shader gets for a triangle that covers the target at depth `z`; `None` if it is clipped.
+fn depth_seen(gpu: &Gpu, clamp: bool, clip: Option<bool>, z: f32) -> Option<f32> {
+    let mut state = vk::PipelineRasterizationDepthClipStateCreateInfoEXT::default()
+        .depth_clip_enable(clip.unwrap_or(false));
+    let mut raster = vk::PipelineRasterizationStateCreateInfo::default()
+        .line_width(1.0)
+        .depth_clamp_enable(clamp);
+    if clip.is_some() {
+        raster.p_next = std::ptr::from_mut(&mut state).cast();
+    }
+    let options = PipelineOptions {
+        vertex: "layout(location = 0) in vec4 position;
+                 layout(location = 0) out float depth;
+                 void main() { gl_Position = position; depth = position.z; }",
+        fragment: Some(
+            "layout(location = 0) in float depth;
+             layout(location = 0) out vec4 color;
+             void main() { color = vec4(depth); }",
+        ),
+        raster,
+        ..PipelineOptions::default()
+    };
+    red_of_triangle(gpu, &options, z, 1.0, [0.0, 1.0])
 }
 
 #[gaurast_runner::test(needs = [GLSLANG])]
@@ -85,16 +98,9 @@ fn planes_clip_as_the_pipeline_says() {
     assert_eq!(depth_seen(&gpu, false, Some(true), 0.5), Some(0.5));
 }
 
-/// The depths of fragments of a target whose every pixel is covered at depth `z` with a w of 2, in a viewport whose depths
-/// are a quarter to three quarters; None where it is clipped.
+/// The depth of the fragments of a triangle that covers the target at depth `z` with a w of 2, in a viewport whose depths are a
+/// quarter to three quarters; `None` if it is clipped.
 fn depth_in_viewport(gpu: &Gpu, negative_one_to_one: bool, z: f32) -> Option<f32> {
-    let target = Target::new(
-        gpu,
-        &TargetOptions {
-            size: [4, 4],
-            ..TargetOptions::of(vk::Format::R32_SFLOAT)
-        },
-    );
     let options = PipelineOptions {
         vertex: "layout(location = 0) in vec4 position;
                  void main() { gl_Position = position; }",
@@ -105,33 +111,7 @@ fn depth_in_viewport(gpu: &Gpu, negative_one_to_one: bool, z: f32) -> Option<f32
         negative_one_to_one,
         ..PipelineOptions::default()
     };
-    let pipeline = Pipeline::new(gpu, &target, &options);
-    let vertex = |x: f32, y: f32| Vertex {
-        position: [2.0 * x, 2.0 * y, 2.0 * z, 2.0],
-        color: [0.0; 4],
-    };
-    let vertices = Buffer::of(
-        gpu,
-        &[vertex(-1.0, -1.0), vertex(3.0, -1.0), vertex(-1.0, 3.0)],
-    );
-    let pass = Pass {
-        color: vk::ClearColorValue {
-            float32: [100.0; 4],
-        },
-        ..Pass::default()
-    };
-    gpu.run(|commands| {
-        commands.pass(&target, &pass, || {
-            commands.bind(&pipeline);
-            commands.viewport([0.0, 0.0, 4.0, 4.0], [0.25, 0.75]);
-            commands.vertices(&vertices);
-            commands.draw(0..3);
-        });
-    });
-    let found: Vec<f32> =
-        bytemuck::pod_collect_to_vec(&target.colors[0].read(vk::ImageAspectFlags::COLOR, 4));
-    assert!(found.iter().all(|depth| depth == &found[0]), "{found:?}");
-    (found[0] != 100.0).then_some(found[0])
+    red_of_triangle(gpu, &options, z, 2.0, [0.25, 0.75])
 }
 
 #[gaurast_runner::test(needs = [GLSLANG])]

@@ -118,7 +118,7 @@ struct Case {
     name: String,
     target: TargetOptions,
     reverse: bool,
-    /// Whether the state is set by a command, not by the pipeline, where depths before the viewport are from -1 to 1.
+    /// True if the state is set by a command, not by the pipeline, where depths before the viewport are from -1 to 1.
     sets_depths: bool,
     /// The viewport's depths of 0 and 1.
     range: [f32; 2],

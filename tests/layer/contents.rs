@@ -43,7 +43,7 @@ fn logarithms() -> Vec<Splat> {
     vec![splat(SCALE, [-2.3; 3]); 3]
 }
 
-/// What is said of a draw from memory that the host can't map, to which `upload` records how Gaussians get there.
+/// The messages of a draw from memory that the host can't map, to which `upload` records how Gaussians get there.
 fn from_the_device(gpu: &Gpu, upload: impl FnOnce(&Commands, vk::Buffer)) -> Vec<Message> {
     let pipeline = splats().create(gpu).expect("a pipeline");
     let size = 3 * size_of::<Splat>() as u64;
@@ -62,7 +62,7 @@ fn from_the_device(gpu: &Gpu, upload: impl FnOnce(&Commands, vk::Buffer)) -> Vec
     gpu.messages()
 }
 
-/// What is said of a draw whose camera comes from a uniform buffer.
+/// The messages of a draw whose camera comes from a uniform buffer.
 fn through_a_buffer(gpu: &Gpu, cameras: &[u8], count: u32) -> Vec<Message> {
     let buffer = Buffer::of(gpu, cameras);
     let set = Bindings::new(gpu, &[Resource::Uniform(buffer.raw)]);

@@ -7,7 +7,7 @@ use gaurast_testkit::{Gpu, Message};
 
 use crate::stage::{Mistake, mistake};
 
-/// What is said as a device is created.
+/// The messages as a device is created.
 fn created(gpu: &Gpu, has_extension: bool, features: Option<Features<'static>>) -> Vec<Message> {
     gpu.messages();
     let queues = [vk::DeviceQueueCreateInfo::default().queue_priorities(&[1.0])];

@@ -22,7 +22,7 @@ fn draw(
     })
 }
 
-/// What is said of a draw in a pass with views 0 and 2.
+/// The messages of a draw in a pass with views 0 and 2.
 fn in_views(gpu: &Gpu) -> Vec<Message> {
     let options = ImageOptions {
         layers: 3,

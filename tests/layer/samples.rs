@@ -66,7 +66,7 @@ fn run(program: &Path, arguments: &[&str], layers: &str, folder: &Path) -> Outpu
         .expect("the program runs")
 }
 
-/// What a program says, on both outputs.
+/// A program's standard output and standard error.
 fn said(output: &Output) -> String {
     assert!(output.status.success(), "{output:?}");
     let text = [&output.stdout[..], &output.stderr[..]].concat();

@@ -16,7 +16,7 @@ fn end(commands: &Commands) {
     unsafe { gaussian(commands.gpu()).cmd_end_gaussian_set(commands.raw) };
 }
 
-/// What is said of commands within a pass.
+/// The messages of commands within a pass.
 fn within(gpu: &Gpu, record: impl FnOnce(&Commands)) -> Vec<Message> {
     let target = Target::floats(gpu, SIZE);
     recording(gpu, |commands| {
@@ -24,7 +24,7 @@ fn within(gpu: &Gpu, record: impl FnOnce(&Commands)) -> Vec<Message> {
     })
 }
 
-/// What is said of a set of two draws with a change between them.
+/// The messages of a set of two draws with a change between them.
 fn changed(
     gpu: &Gpu,
     dynamic: Option<vk::DynamicState>,

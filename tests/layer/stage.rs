@@ -55,7 +55,7 @@ impl Stage {
     }
 }
 
-/// What the layer's messages begin with.
+/// The beginning of the layer's messages.
 const PREFIX: &str = "VK_LAYER_GAURAST_validation: ";
 
 /// The layer's messages, without the layer's name.
@@ -82,7 +82,7 @@ pub type Splat = [f32; 14];
 pub const SPLAT: Splat = [
     0.0, 0.0, 5.0, 0.1, 0.1, 0.1, 1.0, 0.0, 0.0, 0.0, 0.8, 0.5, 0.5, 0.5,
 ];
-/// Where parts of a [`Splat`] begin.
+/// The offsets of the parts of a [`Splat`].
 pub const SCALE: usize = 3;
 pub const ROTATION: usize = 6;
 pub const OPACITY: usize = 10;
@@ -247,7 +247,7 @@ pub fn resolved(
     request.with_shader(Shader::fragment(words))
 }
 
-/// What is said as a pipeline is created.
+/// The messages as a pipeline is created.
 pub fn creation(gpu: &Gpu, request: &Graphics<'_>) -> Vec<Message> {
     gpu.messages();
     // The driver may refuse it.
@@ -255,14 +255,14 @@ pub fn creation(gpu: &Gpu, request: &Graphics<'_>) -> Vec<Message> {
     gpu.messages()
 }
 
-/// What is said as commands are recorded.
+/// The messages as commands are recorded.
 pub fn recording(gpu: &Gpu, record: impl FnOnce(&Commands)) -> Vec<Message> {
     gpu.messages();
     let _ = gpu.try_record(record);
     gpu.messages()
 }
 
-/// What is said as a pass is recorded and executed, in which a pipeline and Gaussians are bound.
+/// The messages as a pass is recorded and executed, in which a pipeline and Gaussians are bound.
 pub fn drawing(
     gpu: &Gpu,
     request: &Graphics<'_>,
@@ -287,7 +287,7 @@ pub fn drawing(
     gpu.messages()
 }
 
-/// What is said of a draw of these Gaussians.
+/// The messages of a draw of these Gaussians.
 pub fn drawn(gpu: &Gpu, request: &Graphics<'_>, splats: &[Splat]) -> Vec<Message> {
     drawing(gpu, request, splats, |commands| {
         commands.camera(&camera());

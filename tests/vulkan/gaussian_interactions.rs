@@ -1,4 +1,4 @@
-//! What the extension's text says of state and features that are made for triangles, and of colours in attachments.
+//! The extension beside state and features that are made for triangles, and the colours in attachments.
 
 use crate::devices::image;
 use crate::scene::{FORMAT, HEIGHT, Scene, Splat, WIDTH, over, splat, splats};

@@ -449,7 +449,7 @@ fn naming_gaussians() -> Graphics<'static> {
     }
 }
 
-/// What is heard when a pipeline has a stage.
+/// The messages when a pipeline has a stage.
 fn with_a_stage(gpu: &Gpu, stage: vk::ShaderStageFlags, result: vk::Result) -> String {
     let code = vec![0x0723_0203, 0x0001_0000, 0, 1, 0];
     let request = Graphics {

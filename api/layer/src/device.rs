@@ -14,10 +14,10 @@ use crate::objects::Objects;
 use crate::recording::Recording;
 use crate::report::Faults;
 
-/// How often one message is given on a device.
+/// The greatest number of times that one message is given on a device.
 const REPEATS: u32 = 32;
 
-/// What changes.
+/// The state that changes as commands are called.
 #[derive(Default)]
 pub(crate) struct State {
     pub(crate) objects: Objects,
@@ -106,7 +106,7 @@ impl Device {
         devices.remove(&key)
     }
 
-    /// What changes, locked.
+    /// Locks the state that changes.
     pub(crate) fn lock(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }

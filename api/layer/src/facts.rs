@@ -1,4 +1,4 @@
-//! What a device is: its features that are enabled, its limits, and copies of the extension's structures.
+//! A device's facts: its enabled features, its limits, and copies of the extension's structures.
 
 use ash::vk;
 use gaurast::vk as gvk;
@@ -58,7 +58,7 @@ pub(crate) type Camera = Plain<gvk::GaussianCameraGAURAST<'static>>;
 /// Harmonics in a buffer.
 pub(crate) type Harmonics = Plain<gvk::GaussianSphericalHarmonicsBufferGAURAST<'static>>;
 
-/// What a device has and allows.
+/// The features and limits of a device.
 pub(crate) struct Facts {
     /// The extension is enabled.
     pub(crate) has_extension: bool,

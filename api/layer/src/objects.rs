@@ -1,4 +1,4 @@
-//! What the layer knows of a device's objects.
+//! A device's objects, as far as the layer follows them.
 
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
@@ -38,7 +38,7 @@ pub(crate) struct Buffer {
     pub(crate) address: Option<vk::DeviceAddress>,
     /// The device may have written it in a way that the layer does not follow.
     pub(crate) is_written: bool,
-    /// What transfers wrote that the layer follows, by offset.
+    /// The bytes that transfers wrote, as far as the layer follows them, by offset.
     pub(crate) shadow: BTreeMap<u64, Arc<Vec<u8>>>,
 }
 
@@ -89,7 +89,7 @@ pub(crate) type RenderPass = Vec<Subpass>;
 pub(crate) struct VertexBinding {
     pub(crate) stride: u32,
     pub(crate) by_instance: bool,
-    /// How many instances take the same element; 0: all of them.
+    /// The number of instances that take the same element; 0: all of them.
     pub(crate) divisor: u32,
 }
 

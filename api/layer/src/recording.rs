@@ -44,7 +44,7 @@ pub(crate) struct Pass {
     pub(crate) drawn: Vec<Option<[f32; 4]>>,
 }
 
-/// What a draw of Gaussians in a set must have in common with the first one.
+/// The state that all draws of a set have in common.
 #[derive(Clone)]
 pub(crate) struct Shared {
     pub(crate) pipeline: Arc<Pipeline>,
@@ -79,7 +79,7 @@ pub(crate) struct Draw {
     pub(crate) was_checked: AtomicBool,
 }
 
-/// What a command buffer does that the layer follows.
+/// The commands of a command buffer that the layer follows.
 #[derive(Clone)]
 pub(crate) enum Operation {
     Copy(vk::Buffer, vk::Buffer, Vec<vk::BufferCopy>),

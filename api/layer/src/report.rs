@@ -15,7 +15,7 @@ pub(crate) struct Fault {
     pub(crate) id: &'static str,
     /// It breaks a rule of valid usage.
     pub(crate) is_error: bool,
-    /// What is wrong, with the values, and what would be right.
+    /// The text: the fault with its values, and the valid usage.
     pub(crate) text: String,
 }
 

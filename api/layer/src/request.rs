@@ -29,7 +29,7 @@ pub(crate) struct Footprint {
     pub(crate) compensation_floor: f32,
 }
 
-/// What a graphics pipeline is asked to be.
+/// The parameters of a graphics pipeline's creation.
 pub(crate) struct Request {
     pub(crate) draws_gaussians: bool,
     pub(crate) restart: bool,

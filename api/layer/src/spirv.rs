@@ -1,4 +1,4 @@
-//! What a shader's entry point reads and writes by location, from its SPIR-V.
+//! The inputs and outputs of a shader's entry point by location, from its SPIR-V.
 
 use std::collections::BTreeMap;
 
@@ -176,7 +176,7 @@ impl Module {
     }
 }
 
-/// What an entry point reads or writes.
+/// The inputs or outputs of an entry point.
 pub(crate) struct Interface {
     /// By location.
     pub(crate) slots: Slots,

@@ -55,7 +55,7 @@ impl CutOff {
     }
 }
 
-/// What Gaussians are in space.
+/// The shape of Gaussians in space.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Geometry {
     /// Volumes with three axes, as in 3DGS.

@@ -10,7 +10,7 @@ use glam::{DQuat, DVec3};
 
 use crate::renderers::OtherRenderer;
 
-/// What every command's help ends with.
+/// The end of every command's help.
 pub const EXIT_CODES: &str = "Exit codes: 0 done, 1 it failed and one sentence on stderr says why, 2 the command line means \
     nothing.";
 
@@ -218,7 +218,7 @@ pub struct ModeArguments {
     #[arg(long = "as", value_name = "RENDERER", value_enum)]
     pub renderer: Option<OtherRenderer>,
 
-    /// What the Gaussians are sorted by
+    /// The key that the Gaussians are sorted by
     #[arg(long, value_enum, default_value_t)]
     pub order: Order,
 
@@ -258,7 +258,7 @@ impl ModeArguments {
     }
 }
 
-/// What is written, and where.
+/// The files that are written.
 #[derive(Args, Default)]
 #[command(next_help_heading = "Output")]
 pub struct OutputArguments {

@@ -10,7 +10,7 @@ pub enum OtherRenderer {
     Inria,
     /// gsplat's: tiles of a rectangle of 3.33 standard deviations, alphas of up to 0.999, from 0.01 on
     Gsplat,
-    /// What KHR_gaussian_splatting says: an ellipse of 3 standard deviations, by distance from the camera
+    /// As KHR_gaussian_splatting says: an ellipse of 3 standard deviations, by distance from the camera
     Gltf,
 }
 

@@ -51,7 +51,7 @@ pub(crate) struct ViewConstants {
     pub(super) optimizations: Optimizations,
     /// The map from depth variables to depths, if the draw needs depths.
     pub(super) depth: Option<CenterDepth>,
-    /// Whether identities are kept.
+    /// True if identities are kept.
     pub(super) is_tracked: bool,
     /// The cut-off by which tiles are left out.
     pub(super) list_cut_off: Option<TileCutOff>,

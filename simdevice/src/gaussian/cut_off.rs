@@ -40,7 +40,7 @@ impl TileCutOff {
         })
     }
 
-    /// Whether its tiles are the device's.
+    /// True if its tiles are the device's.
     pub(crate) fn is_in_device_tiles(&self) -> bool {
         let whole = |corner: f64| corner % CUT_TILE == 0.0;
         f64::from(TILE_SIZE) == CUT_TILE && self.corner.into_iter().all(whole)

@@ -36,7 +36,7 @@ pub(super) struct Key {
     depth: Option<Format>,
     /// True if a fragment program computes colours. Then nothing is hidden by others.
     is_resolved: bool,
-    /// Whether it reads which Gaussians there are.
+    /// True if it reads indices of Gaussians.
     is_tracked: bool,
 }
 

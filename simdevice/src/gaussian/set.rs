@@ -133,13 +133,13 @@ impl GaussianSet {
         }
     }
 
-    /// Whether a fragment program reads which Gaussians there are, or depth variables.
+    /// True if a fragment program reads indices of Gaussians, or depth variables.
     pub(super) fn is_tracked(&self) -> bool {
         let shader = self.resolve.as_ref();
         shader.is_some_and(|shader| shader.program.is_tracking())
     }
 
-    /// Whether it is of 2D Gaussians.
+    /// True if the set is of 2D Gaussians.
     pub(super) fn is_flat(&self) -> bool {
         self.begin.state.geometry == GaussianGeometry::Surfel
     }

@@ -35,7 +35,7 @@ pub(crate) struct SortedSet {
     pub(super) ray_depths: Option<Vec<Vec<RayDepth>>>,
     /// By group, as the splats, if a fragment program reads which they are.
     pub(super) identities: Option<Vec<Vec<Identity>>>,
-    /// What became of the set's Gaussians.
+    /// The counts of the set's Gaussians, by their fate.
     pub(super) counters: Counters,
 }
 
@@ -65,11 +65,11 @@ pub struct BinnedDraw {
     pub(crate) camera: Camera,
     /// The upper left corner of the viewport's area, in pixels.
     pub(crate) viewport_corner: [f64; 2],
-    /// Whether lists of tiles see to the cut-off.
+    /// True if the lists of tiles already apply the cut-off.
     pub(crate) are_lists_cut: bool,
     /// The draws of the set, if a fragment program reads which Gaussians there are.
     pub(crate) origins: Option<Origins>,
-    /// Where the work of its tiles goes, if anybody wants to know.
+    /// The record of its tiles' work, if one is kept.
     pub(crate) record: Option<Arc<DrawRecord>>,
 }
 
@@ -166,12 +166,12 @@ impl BinnedDraw {
         self.sorted.surfels.as_deref()
     }
 
-    /// Which the splats are, if a fragment program reads that.
+    /// The identities of the splats, if a fragment program reads them.
     pub(crate) fn identities(&self) -> Option<&[Vec<Identity>]> {
         self.sorted.identities.as_deref()
     }
 
-    /// What pixels sort by, if each does so for itself.
+    /// The depths that pixels sort by, if each pixel sorts for itself.
     pub(crate) fn ray_depths(&self) -> Option<RayDepths<'_>> {
         let of = self.sorted.ray_depths.as_ref()?;
         Some(RayDepths {

@@ -110,7 +110,7 @@ pub(crate) struct ProjectedGroup {
     pub ray_depths: Vec<RayDepth>,
     /// The disc of each, for 2D Gaussians.
     pub surfels: Vec<Surfel>,
-    /// Which each is, if a fragment program wants to know.
+    /// The identity of each splat, if a fragment program reads it.
     pub identities: Vec<Identity>,
     /// The tiles of each.
     pub reaches: Vec<TileFootprint>,

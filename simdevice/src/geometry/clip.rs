@@ -76,7 +76,7 @@ impl Clipper<'_> {
         self.transform.near.into()
     }
 
-    /// How far a vertex is inside a plane; negative outside.
+    /// The distance of a vertex from a plane: positive inside, negative outside.
     fn distance(&self, plane: Plane, vertex: &ClipVertex) -> f64 {
         let [_, _, z, w] = vertex.position;
         match plane {

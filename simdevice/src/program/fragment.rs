@@ -173,7 +173,7 @@ impl Interface {
 pub struct GaussianFragmentProgram {
     pub(crate) stage: FragmentStage,
     pub(crate) reads_depth: bool,
-    /// Whether it reads which Gaussians there are, or depth variables.
+    /// True if it reads indices of Gaussians, or depth variables.
     pub(crate) is_tracking: bool,
 }
 
@@ -210,7 +210,7 @@ impl GaussianFragmentProgram {
         self.reads_depth
     }
 
-    /// Whether it reads which Gaussians there are, or depth variables.
+    /// True if it reads indices of Gaussians, or depth variables.
     pub fn is_tracking(&self) -> bool {
         self.is_tracking
     }

@@ -36,7 +36,7 @@ pub mod resolve {
     pub const NEAREST_GAUSSIAN: u32 = 10;
     /// The first of those that the camera is: [`CAMERA_LOCATIONS`] of four each.
     pub const CAMERA: u32 = 12;
-    /// How many vectors the camera is.
+    /// The number of vectors that the camera takes.
     pub const CAMERA_LOCATIONS: u32 = 6;
 }
 

@@ -164,9 +164,9 @@ pub struct GaussianState {
     pub transmittance_floor: f32,
     /// The pixels that they may reach.
     pub footprint: GaussianFootprint,
-    /// How far pixels may be from all that.
+    /// The approximations that pixels may have.
     pub approximation: GaussianApproximation,
-    /// Whether depths before the viewport, and those of clip space, are from -1, not from 0, to 1.
+    /// True if depths before the viewport, and those of clip space, are from -1, not from 0, to 1.
     pub negative_one_to_one: bool,
     /// The samples that may be covered.
     pub sample_mask: u32,

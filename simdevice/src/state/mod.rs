@@ -283,7 +283,7 @@ pub struct DrawState {
     pub depth_clamp: bool,
     /// True if primitives are clipped at the near and far planes. `None` follows from `depth_clamp`.
     pub depth_clip: Option<bool>,
-    /// Whether clip space's depths are from -w, not from 0, to w.
+    /// True if clip space's depths are from -w, not from 0, to w.
     pub negative_one_to_one: bool,
     /// Nothing is rasterized.
     pub rasterizer_discard: bool,

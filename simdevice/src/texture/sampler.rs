@@ -22,7 +22,7 @@ pub enum MipmapMode {
     Linear,
 }
 
-/// What coordinates outside the image mean, along one axis. Cubes without seams have no outside and ignore it.
+/// The meaning of coordinates outside the image, along one axis. Cubes without seams have no outside and ignore it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum AddressMode {
     /// The image repeats.
@@ -94,7 +94,7 @@ pub struct Sampler {
     pub compare_op: Option<CompareOp>,
     /// The colour outside of the image.
     pub border_color: BorderColor,
-    /// Whether a cube's faces are images of their own, each with an outside.
+    /// True if a cube's faces are images of their own, each with an outside.
     pub has_seams: bool,
     /// Coordinates count texels of the view's first level, the only one that is read.
     pub unnormalized_coordinates: bool,

@@ -165,7 +165,7 @@ pub struct Case<'a> {
     pub outputs: &'a [OracleOutputs],
     /// The parts of them that are separate draws.
     pub draws: Vec<Draw>,
-    /// Whether clip space's depths are from -w, not from 0, to w.
+    /// True if clip space's depths are from -w, not from 0, to w.
     pub negative_one_to_one: bool,
     pub depth: Option<(CompareOp, bool)>,
     pub resolve: Option<GaussianFragmentStage>,

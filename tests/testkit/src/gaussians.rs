@@ -122,7 +122,7 @@ pub struct GaussianOptions<'a> {
     pub formats: Formats,
     /// The render pass in which it is used, or `None` for dynamic rendering.
     pub render_pass: Option<vk::RenderPass>,
-    /// Whether depths before the viewport are from -1, not from 0, to 1.
+    /// True if depths before the viewport are from -1, not from 0, to 1.
     pub negative_one_to_one: bool,
     /// Depth and stencil tests.
     pub depth_stencil: vk::PipelineDepthStencilStateCreateInfo<'static>,

@@ -68,9 +68,9 @@ pub struct Graphics<'a> {
     pub restart: bool,
     /// Number of viewports and of scissors.
     pub viewports: u32,
-    /// Whether clip space's depths are from -w, not from 0, to w.
+    /// True if clip space's depths are from -w, not from 0, to w.
     pub negative_one_to_one: bool,
-    /// Whether the last vertex of a primitive has what is flat.
+    /// True if the last vertex of a primitive is the provoking one.
     pub provoking_last: bool,
     /// Rasterization.
     pub raster: vk::PipelineRasterizationStateCreateInfo<'static>,
@@ -337,7 +337,7 @@ pub struct PipelineOptions<'a> {
     pub topology: vk::PrimitiveTopology,
     /// True if an index of all ones begins a new primitive.
     pub restart: bool,
-    /// Whether clip space's depths are from -w, not from 0, to w.
+    /// True if clip space's depths are from -w, not from 0, to w.
     pub negative_one_to_one: bool,
     /// Rasterization.
     pub raster: vk::PipelineRasterizationStateCreateInfo<'static>,

@@ -124,7 +124,7 @@ fn look(device: &Device, state: &mut State, draw: &Draw, faults: &mut Faults) {
     contents::check(draw, &contents, &device.facts, faults);
 }
 
-/// What a draw reads, as a number.
+/// A hash of a draw's pipeline, buffers and counts, by which each is checked once.
 fn key(draw: &Draw, objects: &Objects) -> u64 {
     let mut hasher = DefaultHasher::new();
     draw.pipeline.serial.hash(&mut hasher);
@@ -194,7 +194,7 @@ fn forget(objects: &mut Objects, to: vk::Buffer, offset: u64, size: u64) {
     }
 }
 
-/// What buffers hold.
+/// The contents of buffers.
 struct Contents<'a> {
     device: &'a Device,
     objects: &'a Objects,

@@ -1,4 +1,4 @@
-//! What a draw reads from its buffers, as the device finds it when it executes.
+//! The contents of a draw's buffers, as the device finds them when it executes.
 
 use std::collections::BTreeMap;
 
@@ -176,7 +176,7 @@ struct Elements {
 struct Source {
     format: Format,
     offset: u64,
-    /// How many instances take the same element, if it advances by instance; 0: all of them.
+    /// The number of instances that take the same element, if it advances by instance; 0: all of them.
     divisor: Option<u64>,
     /// The place of its elements among those of all bindings.
     elements: usize,
@@ -531,7 +531,7 @@ impl Counts {
     }
 }
 
-/// Where a Gaussian is, seen from the camera.
+/// The place of a Gaussian, seen from the camera.
 enum Place {
     Behind,
     Beyond,

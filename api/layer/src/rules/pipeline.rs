@@ -424,7 +424,7 @@ fn check_camera(gaussian: &GaussianState, request: &Request, faults: &mut Faults
     });
 }
 
-/// What is valid and surely not meant.
+/// Warns of state that is valid and surely not meant.
 fn warn(gaussian: &GaussianState, request: &Request, faults: &mut Faults) {
     let has_fragment = request.has(vk::ShaderStageFlags::FRAGMENT);
     if !request.cull_mode.is_empty() && !request.is_dynamic(vk::DynamicState::CULL_MODE) {

@@ -1,4 +1,4 @@
-//! What a pipeline's shaders read and write at the locations that the Gaussian state names.
+//! The inputs and outputs of a pipeline's shaders at the locations that the Gaussian state names.
 
 use gaurast::vk::{
     GAUSSIAN_LOCATION_UNUSED_GAURAST as UNUSED, GaussianResolveInputLocationsGAURAST,

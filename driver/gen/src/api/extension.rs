@@ -72,7 +72,7 @@ pub(super) struct Structure {
     pub(super) structure_type: Option<String>,
     /// The structures whose `pNext` chains may contain it.
     pub(super) extends: Vec<String>,
-    /// Whether only the implementation writes it.
+    /// True if only the implementation writes it.
     pub(super) is_returned: bool,
     pub(super) members: Vec<Member>,
     pub(super) comment: String,

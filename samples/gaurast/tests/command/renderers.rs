@@ -92,7 +92,7 @@ fn ply(scene: &[Gaussian]) -> Vec<u8> {
     bytes
 }
 
-/// What a renderer makes of a Gaussian.
+/// A Gaussian as a renderer projects it.
 struct Splat {
     depth: f64,
     distance: f64,
@@ -104,12 +104,12 @@ struct Splat {
     color: [f64; 3],
 }
 
-/// What renderers differ in.
+/// The rules in which renderers differ.
 struct Rules {
     near: f64,
     ceiling: f64,
     compensated: bool,
-    /// What the ratio of determinants is at least.
+    /// The least ratio of determinants.
     ratio_floor: f64,
     by_distance: bool,
     /// Reports whether a Gaussian is drawn at the pixel of a column and a row, and whether that is a close call.
@@ -221,14 +221,14 @@ fn color(harmonics: &[[f32; 3]; COEFFICIENTS], [x, y, z]: [f64; 3]) -> [f64; 3] 
     })
 }
 
-/// How near to a threshold a number may be for binary32 to decide either way, relative to it.
+/// The distance from a threshold within which binary32 may decide either way, relative to it.
 const CLOSE: f64 = 3e-5;
 
 fn is_close(value: f64, threshold: f64) -> bool {
     (value - threshold).abs() <= CLOSE * threshold.abs().max(1e-9)
 }
 
-/// Whether a number is so near to a whole one that it could be rounded up to either.
+/// Returns true if a number is so near to a whole one that it could be rounded up to either.
 fn is_close_to_whole(value: f64) -> bool {
     (value - value.round()).abs() <= CLOSE
 }

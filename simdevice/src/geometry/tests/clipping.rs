@@ -31,8 +31,8 @@ fn amounts(triangle: &[[f32; 4]], at: [f64; 2]) -> Option<[f64; 3]> {
     (determinant.abs() > 1e-9).then(|| [amount(b, c), amount(c, a), amount(a, b)])
 }
 
-/// Whether a triangle, its depth and its clip distances are visible at a point in pixels; `near` is the depth of the near
-/// plane, if there is one.
+/// Returns true if a triangle, its depth and its clip distances are visible at a point in pixels; `near` is the depth of
+/// the near plane, if there is one.
 fn visible(triangle: &[[f32; 4]], distances: &[[f32; 4]], near: Option<f64>, at: [f64; 2]) -> bool {
     let Some(amounts) = amounts(triangle, at) else {
         return false;

@@ -306,7 +306,7 @@ impl<'a> FragmentStageDraw<'a> {
         }
     }
 
-    /// What a block's lanes read of the Gaussians that they show; zeros where nothing is covered.
+    /// The inputs that a block's lanes read of the Gaussians that they show; zeros where nothing is covered.
     fn tracked_input(
         &self,
         tracked: &Tracked,

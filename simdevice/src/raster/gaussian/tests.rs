@@ -165,7 +165,7 @@ fn naive_pixel(
     naive_sample(draw, tile, [x, y], level, |_| true).fragment
 }
 
-/// What a twin's sample is.
+/// A sample of a twin.
 #[derive(Default)]
 struct Naive {
     /// Some Gaussian's alpha reached the floor, whatever its depth.

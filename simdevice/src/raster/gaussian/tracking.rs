@@ -11,7 +11,8 @@ use crate::gaussian::identity::Identity;
 use crate::simd::exp2::exp2_of_negated;
 use fearless_simd::{Simd, f32x16, prelude::*};
 
-/// What a tile's pixels, or one sample of each, show: numbers of Gaussians in the set, and depth variables.
+/// The Gaussians that a tile's pixels, or one sample of each, show: numbers of Gaussians in the set, and depth
+/// variables.
 #[derive(Clone, Debug)]
 pub(super) struct Tracked {
     /// The number of the first Gaussian that contributed.
@@ -31,7 +32,7 @@ impl Tracked {
     };
 }
 
-/// What a pixel accumulates.
+/// The sums of a pixel.
 #[derive(Clone, Copy, Debug)]
 struct Sum {
     color: [f64; 3],

@@ -81,7 +81,7 @@ impl OracleStencil {
 pub struct OracleTests {
     /// The camera's `depthCoefficients`.
     pub depth_coefficients: [f32; 2],
-    /// Whether depths before the viewport are from -1, not from 0, to 1.
+    /// True if depths before the viewport are from -1, not from 0, to 1.
     pub negative_one_to_one: bool,
     /// The viewport's depths of 0 and of 1.
     pub depth_range: [f32; 2],

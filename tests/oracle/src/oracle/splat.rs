@@ -89,9 +89,9 @@ pub struct Alpha {
     pub value: f64,
     /// The bound on the distance of a binary32 implementation from it.
     pub error: f64,
-    /// Whether the Gaussian is cut off there.
+    /// True if the Gaussian is cut off there.
     pub is_cut: bool,
-    /// Whether that could be decided otherwise.
+    /// True if that could be decided otherwise.
     pub cut_undecidable: bool,
 }
 
@@ -103,7 +103,7 @@ impl Alpha {
         cut_undecidable: false,
     };
 
-    /// Whether it is cut off for certain.
+    /// Returns true if it is cut off for certain.
     pub fn is_certainly_cut(&self) -> bool {
         self.is_cut && !self.cut_undecidable
     }

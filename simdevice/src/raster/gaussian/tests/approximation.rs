@@ -1,4 +1,4 @@
-//! What a draw lets the kernel leave inexact stays within what it says.
+//! Approximations that a draw permits keep their bounds.
 
 use super::*;
 use crate::simd::exp2::{CUBIC, Powers, QUADRATIC};

@@ -58,7 +58,7 @@ fn one_of<T: Copy>(rng: &mut ChaCha8Rng, of: &[T]) -> T {
     *of.choose(rng).unwrap()
 }
 
-/// What is drawn, and what the attachments hold before: by sample of each pixel.
+/// A draw, and the attachments before it: by sample of each pixel.
 struct Scene {
     seed: u64,
     state: GaussianState,
@@ -70,7 +70,7 @@ struct Scene {
     before: Picture,
 }
 
-/// What attachments hold, by sample of each pixel.
+/// The contents of attachments, by sample of each pixel.
 #[derive(Clone, Debug, PartialEq)]
 struct Picture {
     color: Vec<[f32; 4]>,
