@@ -79,22 +79,7 @@ fn through_a_buffer(gpu: &Gpu, cameras: &[u8], count: u32) -> Vec<Message> {
 
 /// A camera's bytes in a uniform buffer.
 pub fn bytes(camera: &GaussianCameraGAURAST<'_>) -> Vec<u8> {
-    let data = GaussianCameraDataGAURAST::from(camera);
-    let mut bytes: Vec<u8> = data
-        .eye
-        .iter()
-        .flat_map(|value| value.to_le_bytes())
-        .collect();
-    bytes.extend(data.model.as_raw().to_le_bytes());
-    bytes.extend([0; 4]);
-    let mut floats = data.rotation.as_flattened().to_vec();
-    floats.extend(data.focal_length);
-    floats.extend(data.principal_point);
-    floats.extend(data.depth_coefficients);
-    floats.extend([data.near_plane, data.far_plane]);
-    bytes.extend(floats.iter().flat_map(|value| value.to_le_bytes()));
-    bytes.resize(128, 0);
-    bytes
+    GaussianCameraDataGAURAST::from(camera).to_bytes().to_vec()
 }
 
 pub fn mistakes() -> Vec<Mistake> {

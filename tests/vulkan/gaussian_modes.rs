@@ -144,15 +144,6 @@ fn a_set_is_drawn_where_it_ends() {
     assert!(merged(&scene, clear) == before);
 }
 
-/// The bytes of a camera as a uniform buffer holds it.
-fn camera_bytes(data: &GaussianCameraDataGAURAST) -> Vec<u8> {
-    // SAFETY: the structure has no padding: 3 x 8, 2 x 4, 12 x 4, 8 x 4 and 4 x 4 bytes.
-    let bytes = unsafe {
-        std::slice::from_raw_parts(std::ptr::from_ref(data).cast::<u8>(), size_of_val(data))
-    };
-    bytes.to_vec()
-}
-
 /// A layout with one set of one dynamic uniform buffer, and a pool for it.
 struct CameraSet {
     set_layout: vk::DescriptorSetLayout,
@@ -227,7 +218,7 @@ fn the_camera_may_come_from_a_uniform_buffer() {
         (256, moved),
         (512, camera().near_plane(-1.0)),
     ] {
-        let data = camera_bytes(&GaussianCameraDataGAURAST::from(&camera));
+        let data = GaussianCameraDataGAURAST::from(&camera).to_bytes();
         bytes[offset..offset + data.len()].copy_from_slice(&data);
     }
     let buffer = Buffer::of(&scene.gpu, &bytes);

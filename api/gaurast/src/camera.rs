@@ -67,6 +67,34 @@ impl From<&GaussianCameraGAURAST<'_>> for GaussianCameraDataGAURAST {
     }
 }
 
+impl GaussianCameraDataGAURAST {
+    /// The bytes of the camera as a uniform buffer holds them.
+    #[must_use]
+    pub fn to_bytes(&self) -> [u8; 128] {
+        let mut bytes = [0; 128];
+        let mut rest = &mut bytes[..];
+        let mut put = |value: &[u8]| {
+            let (to, after) = std::mem::take(&mut rest).split_at_mut(value.len());
+            to.copy_from_slice(value);
+            rest = after;
+        };
+        for value in self.eye {
+            put(&value.to_ne_bytes());
+        }
+        put(&self.model.as_raw().to_ne_bytes());
+        put(&self.reserved.to_ne_bytes());
+        let floats = (self.rotation.into_iter().flatten())
+            .chain(self.focal_length)
+            .chain(self.principal_point)
+            .chain(self.depth_coefficients)
+            .chain([self.near_plane, self.far_plane]);
+        for value in floats {
+            put(&value.to_ne_bytes());
+        }
+        bytes
+    }
+}
+
 impl GaussianCameraGAURAST<'_> {
     /// The camera of a right-handed view matrix, which looks along -z with +y up (OpenGL's convention), and a
     /// projection matrix for it, such as those of `glam::camera::rh::proj::vulkan`.

@@ -166,15 +166,6 @@ impl ColorFormat {
         }
     }
 
-    /// The number of bytes of a texel.
-    pub(crate) fn texel(self) -> u64 {
-        match self {
-            Self::Float32 => 16,
-            Self::Float16 => 8,
-            Self::Unorm8 => 4,
-        }
-    }
-
     /// The greatest rounding error of storing a number of at most `greatest`: half a step of the format.
     pub(crate) fn rounding(self, greatest: f64) -> f64 {
         match self {
@@ -411,14 +402,17 @@ impl Draw {
         use vk::FormatFeatureFlags as F;
         let copies = F::TRANSFER_SRC | F::TRANSFER_DST;
         let color = F::COLOR_ATTACHMENT | F::COLOR_ATTACHMENT_BLEND | copies;
-        if !device.has_format(self.format.raw(), color) {
+        let has = |format, usage| device.gpu.format_features(format).contains(usage);
+        if !has(self.format.raw(), color) {
             return Some("the colour attachment's format");
         }
         let tested = F::DEPTH_STENCIL_ATTACHMENT | copies;
-        if depth.is_some_and(|depth| !device.has_format(depth.format, tested)) {
+        if depth.is_some_and(|depth| !has(depth.format, tested)) {
             return Some("the depth attachment's format");
         }
-        if depth.is_some_and(|depth| depth.bounds.is_some()) && !device.has_depth_bounds() {
+        if depth.is_some_and(|depth| depth.bounds.is_some())
+            && device.gpu.features().depth_bounds == vk::FALSE
+        {
             return Some("depthBounds");
         }
         None

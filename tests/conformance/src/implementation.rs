@@ -2,8 +2,11 @@
 
 use gaurast_oracle::oracle::Stored;
 
-use crate::device::Error;
 use crate::draw::Draw;
+
+/// The reason for which drawing failed, or there is nothing to test.
+#[derive(Debug)]
+pub struct Error(pub String);
 
 /// Contents of the attachments after a draw.
 #[derive(Clone, Debug, Default)]

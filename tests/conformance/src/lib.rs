@@ -9,33 +9,30 @@
 pub mod cases;
 pub mod device;
 pub mod draw;
-pub mod driver;
 pub mod implementation;
 pub mod judge;
 #[cfg(feature = "mistakes")]
 pub mod mistakes;
-pub mod record;
+mod record;
 pub mod report;
 mod resolved;
 mod run;
 pub mod second;
 
 pub use cases::{Case, all};
+pub use device::Device;
 pub use draw::Draw;
-pub use driver::Driver;
-pub use implementation::{Implementation, Picture};
+pub use implementation::{Error, Implementation, Picture};
 pub use run::{Failure, Outcome, run};
 pub use second::Second;
 
-use device::Error;
-
-/// Opens the implementation with this name: `second`, or a driver as [`Driver::open`] accepts it.
+/// Opens the implementation with this name: `second`, or a driver as [`Device::open`] accepts it.
 ///
 /// # Errors
 /// If there is no such implementation.
 pub fn open(name: &str) -> Result<Box<dyn Implementation>, Error> {
     match name {
         "second" => Ok(Box::new(Second)),
-        driver => Ok(Box::new(Driver::open(driver)?)),
+        driver => Ok(Box::new(Device::open(driver)?)),
     }
 }

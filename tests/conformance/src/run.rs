@@ -40,6 +40,13 @@ impl Failure {
     }
 }
 
+/// The message of a panic.
+fn message(panic: &(dyn std::any::Any + Send)) -> &str {
+    let text = panic.downcast_ref::<String>().map(String::as_str);
+    text.or_else(|| panic.downcast_ref::<&str>().copied())
+        .unwrap_or("it panics")
+}
+
 /// Lets an implementation draw the case, and judges the picture. An unsupported case is not drawn.
 pub fn run(case: &Case, implementation: &dyn Implementation) -> Outcome {
     let draw = case.draw();
@@ -57,7 +64,7 @@ pub fn run(case: &Case, implementation: &dyn Implementation) -> Outcome {
     let picture = match drawn {
         Ok(Ok(picture)) => picture,
         Ok(Err(error)) => return nothing(error.0),
-        Err(_) => return nothing("the driver panics".to_owned()),
+        Err(panic) => return nothing(format!("the driver refuses: {}", message(&*panic))),
     };
     if let Some(shown) = draw.shown {
         return match resolved::distance(&draw, shown, &picture) {

@@ -9,9 +9,8 @@ use gaurast::vk::{
 use gaurast_oracle::oracle::Stored;
 use gaurast_second as second;
 
-use crate::device::Error;
 use crate::draw::{Blend, ColorFormat, Draw};
-use crate::implementation::{Implementation, Picture};
+use crate::implementation::{Error, Implementation, Picture};
 use crate::judge::{gathered, sets};
 
 /// The second implementation.

@@ -10,7 +10,7 @@ use gaurast::vk::{
     PipelineGaussianApproximationStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 use gaurast_testkit::shader::{Stage, compile};
-use gaurast_testkit::{Bindings, Buffer, Commands, Gpu, Image, ImageOptions};
+use gaurast_testkit::{Bindings, Buffer, Commands, Gpu, Graphics, Image, ImageOptions, Shader};
 use gaurast_tests::scenes::SceneBuffers;
 
 pub type State = PipelineGaussianStateCreateInfoGAURAST<'static>;
@@ -112,128 +112,52 @@ impl Options<'_> {
 }
 
 /// A pipeline that replaces the contents of a target of 32-bit floats.
-pub struct Pipeline {
-    raw: vk::Pipeline,
-    layout: vk::PipelineLayout,
-}
+pub struct Pipeline(gaurast_testkit::Pipeline);
 
 impl Pipeline {
     pub fn new(streams: &[Stream], options: &Options<'_>) -> Self {
-        let (gpu, device) = (own(), own().device());
         let numbered = || (0..).zip(streams);
-        let bindings: Vec<_> = numbered()
-            .map(|(binding, stream)| vk::VertexInputBindingDescription {
-                binding,
-                stride: stream.stride,
-                input_rate: stream.rate,
-            })
-            .collect();
-        let attributes: Vec<_> = numbered()
-            .flat_map(|(binding, stream)| {
-                let all = stream.attributes.iter();
-                all.map(
-                    move |&(location, format, offset)| vk::VertexInputAttributeDescription {
-                        location,
-                        binding,
-                        format,
-                        offset,
-                    },
-                )
-            })
-            .collect();
-        let vertex_input = vk::PipelineVertexInputStateCreateInfo::default()
-            .vertex_binding_descriptions(&bindings)
-            .vertex_attribute_descriptions(&attributes);
-        let assembly = vk::PipelineInputAssemblyStateCreateInfo::default()
-            .topology(PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST);
-        let viewport = vk::PipelineViewportStateCreateInfo::default()
-            .viewport_count(1)
-            .scissor_count(1);
-        let raster = vk::PipelineRasterizationStateCreateInfo::default().line_width(1.0);
-        let multisample = vk::PipelineMultisampleStateCreateInfo::default()
-            .rasterization_samples(vk::SampleCountFlags::TYPE_1);
-        let writes = [vk::PipelineColorBlendAttachmentState::default()
-            .color_write_mask(vk::ColorComponentFlags::RGBA)];
-        let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&writes);
-        let mut dynamic = vec![vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
-        dynamic.extend(&options.dynamic);
-        let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic);
-        let mut rendering = vk::PipelineRenderingCreateInfo::default()
-            .view_mask(options.view_mask)
-            .color_attachment_formats(&[vk::Format::R32G32B32A32_SFLOAT]);
-        let mut state = options.state;
-        let mut approximation = options.approximation.unwrap_or_default();
-        let words = options.fragment.map(|text| compile(Stage::Fragment, text));
-        let sets: Vec<_> = options.bindings.iter().map(|all| all.layout).collect();
-        let layout_info = vk::PipelineLayoutCreateInfo::default().set_layouts(&sets);
-        let info = vk::GraphicsPipelineCreateInfo::default()
-            .vertex_input_state(&vertex_input)
-            .input_assembly_state(&assembly)
-            .viewport_state(&viewport)
-            .rasterization_state(&raster)
-            .multisample_state(&multisample)
-            .color_blend_state(&blend)
-            .dynamic_state(&dynamic)
-            .push_next(&mut rendering)
-            .push_next(&mut state)
-            .push_next(&mut approximation);
-        // SAFETY: see the module.
-        unsafe {
-            let module = words.map(|words| {
-                let info = vk::ShaderModuleCreateInfo::default().code(&words);
-                gpu.device()
-                    .create_shader_module(&info, None)
-                    .expect("a module")
-            });
-            let stages: Vec<_> = module
-                .iter()
-                .map(|&module| {
-                    vk::PipelineShaderStageCreateInfo::default()
-                        .stage(vk::ShaderStageFlags::FRAGMENT)
-                        .module(module)
-                        .name(c"main")
-                })
-                .collect();
-            let layout = device
-                .create_pipeline_layout(&layout_info, None)
-                .expect("a layout");
-            let infos = [info.layout(layout).stages(&stages)];
-            let pipelines = device
-                .create_graphics_pipelines(vk::PipelineCache::null(), &infos, None)
-                .expect("a pipeline");
-            if let Some(module) = module {
-                device.destroy_shader_module(module, None);
-            }
-            Self {
-                raw: pipelines[0],
-                layout,
-            }
-        }
+        let bindings = numbered().map(|(binding, stream)| vk::VertexInputBindingDescription {
+            binding,
+            stride: stream.stride,
+            input_rate: stream.rate,
+        });
+        let attributes = numbered().flat_map(|(binding, stream)| {
+            let all = stream.attributes.iter();
+            all.map(
+                move |&(location, format, offset)| vk::VertexInputAttributeDescription {
+                    location,
+                    binding,
+                    format,
+                    offset,
+                },
+            )
+        });
+        let shaders = (options.fragment.iter())
+            .map(|source| Shader::fragment(compile(Stage::Fragment, source)));
+        let mut graphics = Graphics {
+            shaders: shaders.collect(),
+            set_layouts: options.bindings.iter().map(|all| all.layout).collect(),
+            bindings: bindings.collect(),
+            attributes: attributes.collect(),
+            topology: PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST,
+            view_mask: options.view_mask,
+            gaussian: Some(options.state),
+            approximation: options.approximation,
+            ..Graphics::default()
+        };
+        graphics.dynamic.extend(&options.dynamic);
+        Self(graphics.create(own()).expect("a pipeline"))
     }
 
     /// Binds the pipeline, its vertex buffers and its descriptors.
     pub fn bind(&self, commands: &Commands, streams: &[Stream], bindings: Option<&Bindings>) {
-        let (device, point) = (commands.device(), vk::PipelineBindPoint::GRAPHICS);
         for (binding, stream) in (0..).zip(streams) {
             commands.vertex_buffer(binding, &stream.buffer, 0);
         }
-        // SAFETY: see the module.
-        unsafe {
-            device.cmd_bind_pipeline(commands.raw, point, self.raw);
-            if let Some(bindings) = bindings {
-                let sets = [bindings.set];
-                device.cmd_bind_descriptor_sets(commands.raw, point, self.layout, 0, &sets, &[]);
-            }
-        }
-    }
-}
-
-impl Drop for Pipeline {
-    fn drop(&mut self) {
-        // SAFETY: see the module.
-        unsafe {
-            own().device().destroy_pipeline(self.raw, None);
-            own().device().destroy_pipeline_layout(self.layout, None);
+        commands.bind(&self.0);
+        if let Some(bindings) = bindings {
+            commands.bind_set(bindings, &[]);
         }
     }
 }

@@ -132,28 +132,9 @@ fn a_uniform_buffer_has_a_camera_for_each_view() {
     let scene = scene();
     let (streams, count) = (Stream::of(&scene), scene.positions.len() as u32);
     let (eyes, mask) = (eyes(), 0b11);
-    let data = eyes.each_ref().map(GaussianCameraDataGAURAST::from);
-    let words = data.map(|camera| {
-        assert_eq!(size_of_val(&camera), 128);
-        let mut words = [0u32; 32];
-        let mut put = |at: usize, values: &[f32]| {
-            for (word, value) in words[at..].iter_mut().zip(values) {
-                *word = value.to_bits();
-            }
-        };
-        put(8, camera.rotation.as_flattened());
-        put(20, &camera.focal_length);
-        put(22, &camera.principal_point);
-        put(24, &camera.depth_coefficients);
-        put(26, &[camera.near_plane, camera.far_plane]);
-        for (axis, value) in camera.eye.into_iter().enumerate() {
-            words[2 * axis] = value.to_bits() as u32;
-            words[2 * axis + 1] = (value.to_bits() >> 32) as u32;
-        }
-        words[6] = camera.model.as_raw().cast_unsigned();
-        words
-    });
-    let buffer = Buffer::of(own(), &words);
+    let data = (eyes.iter()).map(|eye| GaussianCameraDataGAURAST::from(eye).to_bytes());
+    let data: Vec<[u8; 128]> = data.collect();
+    let buffer = Buffer::of(own(), data.as_flattened());
     let bindings = Bindings::new(own(), &[Resource::Uniform(buffer.raw)]);
     let state = State::default()
         .camera_source(GaussianCameraSourceGAURAST::UNIFORM_BUFFER)

@@ -3,14 +3,16 @@
 use ash::vk;
 use gaurast::vk::{
     GaussianAttributeLocationsGAURAST, GaussianCameraGAURAST,
-    PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST, PipelineGaussianStateCreateInfoGAURAST,
+    PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST, PipelineGaussianApproximationStateCreateInfoGAURAST,
+    PipelineGaussianFootprintStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 use gaurast_oracle::scenes::SceneBuffers;
 use half::f16;
 
+use crate::descriptors::Bindings;
 use crate::gpu::{Commands, Gpu};
 use crate::pass::{Attachments, Bindable, Formats};
-use crate::pipeline::{Graphics, Pipeline, opaque};
+use crate::pipeline::{Graphics, Pipeline, Shader, opaque};
 use crate::resource::Buffer;
 
 /// Vertex buffers: positions, scales, rotations, opacities, coefficients.
@@ -77,10 +79,15 @@ impl GaussianScene {
         camera: &GaussianCameraGAURAST,
     ) {
         commands.bind(pipeline);
+        self.bind_buffers(commands);
+        commands.camera(camera);
+    }
+
+    /// Binds the scene's vertex buffers.
+    pub fn bind_buffers(&self, commands: &Commands) {
         for (binding, buffer) in (0..).zip(&self.buffers) {
             commands.vertex_buffer(binding, buffer, 0);
         }
-        commands.camera(camera);
     }
 
     /// Draws all of it, as seen by `camera`.
@@ -108,6 +115,14 @@ pub fn bind_instances(commands: &Commands, instances: &Buffer) {
 pub struct GaussianOptions<'a> {
     /// The Gaussian state. The pipeline sets its degree and locations.
     pub state: PipelineGaussianStateCreateInfoGAURAST<'a>,
+    /// The approximations that it may use.
+    pub approximation: Option<PipelineGaussianApproximationStateCreateInfoGAURAST<'static>>,
+    /// The pixels that Gaussians may reach.
+    pub footprint: Option<PipelineGaussianFootprintStateCreateInfoGAURAST<'static>>,
+    /// The resolve shader.
+    pub resolve: Option<Shader>,
+    /// The descriptor set.
+    pub set: Option<&'a Bindings>,
     /// The degree stored in the scenes that it draws.
     pub stored_degree: u32,
     /// The degree that it draws.
@@ -150,6 +165,10 @@ impl GaussianOptions<'_> {
     pub fn new(degree: u32) -> Self {
         Self {
             state: PipelineGaussianStateCreateInfoGAURAST::default(),
+            approximation: None,
+            footprint: None,
+            resolve: None,
+            set: None,
             stored_degree: degree,
             drawn_degree: degree,
             looks_by_instance: false,
@@ -211,6 +230,8 @@ impl GaussianPipeline {
         let mut dynamic = vec![vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
         dynamic.extend(&options.dynamic);
         let graphics = Graphics {
+            shaders: options.resolve.iter().cloned().collect(),
+            set_layouts: options.set.iter().map(|set| set.layout).collect(),
             bindings: bindings(options),
             attributes: all_attributes(options),
             topology: PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST,
@@ -226,6 +247,8 @@ impl GaussianPipeline {
             depth_format: options.formats.depth,
             subpass: options.render_pass.map(|pass| (pass, 0)),
             gaussian: Some(state),
+            approximation: options.approximation,
+            footprint: options.footprint,
             ..Graphics::default()
         };
         Self(graphics.create(gpu).expect("a pipeline"))

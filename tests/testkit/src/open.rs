@@ -17,6 +17,8 @@ pub enum Driver {
     Loaded,
     /// lavapipe, through the loader.
     Lavapipe,
+    /// Any driver that draws Gaussians, through the loader.
+    Extended,
 }
 
 impl Driver {
@@ -25,12 +27,13 @@ impl Driver {
             Self::Embedded => "a device",
             Self::Loaded => "this driver",
             Self::Lavapipe => "lavapipe",
+            Self::Extended => "a device that draws Gaussians",
         }
     }
 
     fn is(self, id: vk::DriverId) -> bool {
         match self {
-            Self::Embedded => true,
+            Self::Embedded | Self::Extended => true,
             Self::Loaded => id != vk::DriverId::MESA_LLVMPIPE,
             Self::Lavapipe => id == vk::DriverId::MESA_LLVMPIPE,
         }
@@ -40,7 +43,7 @@ impl Driver {
         match self {
             Self::Embedded => Ok(vulkan_gaurast::entry()),
             // SAFETY: the loader is the system's own.
-            Self::Loaded | Self::Lavapipe => unsafe { ash::Entry::load() }
+            Self::Loaded | Self::Lavapipe | Self::Extended => unsafe { ash::Entry::load() }
                 .map_err(|error| OpenError::NoLoader(error.to_string())),
         }
     }
@@ -51,6 +54,8 @@ impl Driver {
 pub struct Opening<'a> {
     /// The driver.
     pub driver: Driver,
+    /// A part of the device's name; empty for any device.
+    pub device: &'a str,
     /// Layers of the instance.
     pub layers: &'a [&'a CStr],
     /// Extensions of the device, in addition to Gaussian draws.
@@ -68,6 +73,7 @@ impl Opening<'_> {
     pub const fn of(driver: Driver) -> Self {
         Self {
             driver,
+            device: "",
             layers: &[],
             extensions: &[],
             all_extensions: false,
@@ -152,7 +158,7 @@ impl Opened {
             let messenger = debug_utils.create_debug_utils_messenger(&messages.messenger(), None);
             let found = messenger
                 .map_err(refused("create a messenger"))
-                .and_then(|_| find(&instance, |id| driver.is(id)))
+                .and_then(|_| find(&instance, opening))
                 .and_then(|found| {
                     let (physical_device, name) =
                         found.ok_or(OpenError::NoDevice(driver.name()))?;
@@ -201,10 +207,10 @@ impl Drop for Opened {
     }
 }
 
-/// The first device of the requested driver, with its name and version.
+/// The first device of the requested driver and name, with its driver's name and version.
 fn find(
     instance: &ash::Instance,
-    is_wanted: impl Fn(vk::DriverId) -> bool,
+    opening: &Opening<'_>,
 ) -> Result<Option<(vk::PhysicalDevice, String)>, OpenError> {
     // SAFETY: the instance is alive.
     let devices = unsafe { instance.enumerate_physical_devices() };
@@ -213,8 +219,12 @@ fn find(
         let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut driver);
         // SAFETY: the physical device is the instance's.
         unsafe { instance.get_physical_device_properties2(device, &mut properties) };
-        if is_wanted(driver.driver_id) {
-            let text = |text: &CStr| text.to_string_lossy().into_owned();
+        let text = |text: &CStr| text.to_string_lossy().into_owned();
+        let own = properties.properties;
+        let is_named =
+            text(own.device_name_as_c_str().unwrap_or_default()).contains(opening.device);
+        let draws = opening.driver != Driver::Extended || has_gaussians(instance, device);
+        if opening.driver.is(driver.driver_id) && is_named && draws {
             let name = text(driver.driver_name_as_c_str().unwrap_or_default());
             let version = text(driver.driver_info_as_c_str().unwrap_or_default());
             return Ok(Some((device, format!("{name} {version}"))));
