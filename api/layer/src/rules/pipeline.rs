@@ -184,6 +184,9 @@ fn check_fixed_function(request: &Request, faults: &mut Faults) {
     for state in [
         vk::DynamicState::PRIMITIVE_RESTART_ENABLE,
         vk::DynamicState::RASTERIZER_DISCARD_ENABLE,
+        vk::DynamicState::VERTEX_INPUT_EXT,
+        vk::DynamicState::ALPHA_TO_COVERAGE_ENABLE_EXT,
+        vk::DynamicState::ALPHA_TO_ONE_ENABLE_EXT,
     ] {
         faults.require(
             !request.is_dynamic(state),
