@@ -139,7 +139,7 @@ fn nothing_is_said_of_the_samples(case: &Case) {
     let sample = SAMPLES.iter().find(|(name, ..)| *name == case.variant());
     let (name, arguments, left) = sample.expect("a sample");
     let program = built_example("gaurast-examples", name);
-    let arguments = [arguments, &["--loader"][..]].concat();
+    let arguments = [*arguments, &["--loader"][..]].concat();
     for layers in [OWN.to_owned(), format!("{OWN}:{KHRONOS}")] {
         let folder = tempfile::tempdir().expect("a folder");
         let output = run(&program, &arguments, &layers, folder.path());

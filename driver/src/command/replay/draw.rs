@@ -97,8 +97,9 @@ pub(crate) enum DrawError {
     DynamicValue(String),
     /// There are more Gaussians than a draw may have.
     #[error(
-        "it has {0} Gaussians, but must have at most maxGaussiansPerDraw ({MAX_GAUSSIANS}) \
-         (VUID-vkCmdDraw-maxGaussiansPerDraw-90083)"
+        "it has {0} Gaussians, but must have at most maxGaussiansPerDraw ({most}) \
+         (VUID-vkCmdDraw-maxGaussiansPerDraw-90083)",
+        most = MAX_GAUSSIANS
     )]
     TooManyGaussians(u64),
     /// No buffer of spherical harmonics is bound.
