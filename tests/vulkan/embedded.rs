@@ -123,7 +123,7 @@ fn what_is_not_there_is_refused() {
     );
 
     let mut features = vk::PhysicalDeviceFeatures2::default();
-    features.features.tessellationShader = vk::TRUE;
+    features.features.tessellation_shader = vk::TRUE;
     let (error, messages) = refusal(&[], &mut features);
     assert_eq!(error, Some(vk::Result::ERROR_FEATURE_NOT_PRESENT));
     assert_eq!(messages.len(), 1, "{messages:?}");

@@ -49,7 +49,8 @@ destroys! {
 
 /// Hooks that look at what was created, and at the device if it is named.
 macro_rules! creates {
-    ($($name:ident($info:ident: $info_type:ty, $object:ident: $type:ty) $(with $own:ident)? |$state:ident| $look:block)*) => {$(
+    ($($name:ident($info:ident: $info_type:ty, $object:ident: $type:ty) $(with $own:ident)?
+        |$state:ident| $look:block)*) => {$(
         pub(super) unsafe extern "system" fn $name(
             device: vk::Device,
             info: *const $info_type,

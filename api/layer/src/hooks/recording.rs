@@ -120,7 +120,8 @@ pub(super) unsafe extern "system" fn end_command_buffer(commands: vk::CommandBuf
     }
 }
 
-/// Hooks of commands without a result: each looks at its parameters, and at the device if it is named, and passes them on.
+/// Hooks of commands without a result: each looks at its parameters, and at the device if it is named, and passes them
+/// on.
 macro_rules! records {
     ($($name:ident($($parameter:ident: $type:ty),*) $(with $own:ident)?
         |$state:ident, $faults:ident| $look:block)*) => {$(
@@ -305,7 +306,8 @@ records! {
         let call = Call::Vertices([first, count, first_instance, instances]);
         rules::draw::check(state.0, call, state.1, &own.facts, faults);
     }
-    cmd_draw_indexed(count: u32, instances: u32, first: u32, offset: i32, first_instance: u32) with own |state, faults| {
+    cmd_draw_indexed(count: u32, instances: u32, first: u32, offset: i32, first_instance: u32)
+        with own |state, faults| {
         let call = Call::Indices([first, count, first_instance, instances], offset);
         rules::draw::check(state.0, call, state.1, &own.facts, faults);
     }
