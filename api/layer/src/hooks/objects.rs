@@ -256,7 +256,7 @@ unsafe fn map(
 pub(super) unsafe extern "system" fn unmap_memory(device: vk::Device, memory: vk::DeviceMemory) {
     // SAFETY: see the module above.
     unsafe {
-        unmap(device, memory, |own| {
+        let _done = unmap(device, memory, |own| {
             own.next.unmap_memory?(device, memory);
             Some(vk::Result::SUCCESS)
         });
