@@ -97,8 +97,12 @@ specification() {
     fi
 }
 step specification specification
-# Builds the tests, and the files that tests start or load: the loader's library and a sample.
-step "build tests" cargo build "${tests[@]}" --example hello_gaussians --quiet
+# Builds the tests, and the files that tests start or load: the loader's library and the samples.
+samples=()
+for sample in hello_gaussians hello_triangle picking wobbling_gaussians tilted_plane gallery; do
+    samples+=(--example "$sample")
+done
+step "build tests" cargo build "${tests[@]}" "${samples[@]}" --quiet
 GAURAST_TEST_LIBRARIES=$(realpath "${CARGO_TARGET_DIR:-target}/checked")
 export GAURAST_TEST_LIBRARIES
 step tests cargo test "${tests[@]}" --quiet --no-fail-fast

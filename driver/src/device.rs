@@ -528,20 +528,20 @@ mod tests {
         let core = vk::PhysicalDeviceFeatures::default().geometry_shader(true);
         refused(
             request(&vk::DeviceCreateInfo::default().enabled_features(&core)),
-            "geometry_shader",
+            "geometryShader",
         );
         let mut core = vk::PhysicalDeviceFeatures2::default();
         core.features.sparse_binding = vk::TRUE;
         refused(
             request(&vk::DeviceCreateInfo::default().push_next(&mut core)),
-            "sparse_binding",
+            "sparseBinding",
         );
         let mut missing = vk::PhysicalDeviceVulkan13Features::default()
             .dynamic_rendering(true)
             .texture_compression_astc_hdr(true);
         refused(
             request(&vk::DeviceCreateInfo::default().push_next(&mut missing)),
-            "texture_compression_astc_hdr",
+            "textureCompressionASTC_HDR",
         );
 
         let mut other = vk::PhysicalDevicePerformanceQueryFeaturesKHR::default()

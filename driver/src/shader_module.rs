@@ -282,10 +282,10 @@ mod tests {
         assert!(check(Capability::ShaderViewportIndexLayerEXT).is_ok());
         assert!(check(Capability::GroupNonUniformArithmetic).is_ok());
         for (capability, words) in [
-            (Capability::Float64, "shader_float64, which is not enabled"),
+            (Capability::Float64, "shaderFloat64, which is not enabled"),
             (
                 Capability::PhysicalStorageBufferAddresses,
-                "buffer_device_address, which is not enabled",
+                "bufferDeviceAddress, which is not enabled",
             ),
         ] {
             let error = check(capability).unwrap_err();

@@ -16,7 +16,9 @@ const SIDE: i32 = 24;
 const STEP: f32 = 0.5;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let folder = std::env::args().nth(1).ok_or("a folder for the pictures")?;
+    let (options, folders): (Vec<_>, Vec<_>) =
+        (std::env::args().skip(1)).partition(|argument| argument == "--loader");
+    let folder = folders.first().ok_or("a folder for the pictures")?;
     let mut scene = Scene::with_capacity(0, (SIDE * SIDE) as usize);
     for row in 0..SIDE {
         for column in 0..SIDE {
@@ -43,7 +45,13 @@ fn main() -> Result<(), Box<dyn Error>> {
         75.0,
         [960, 540],
     )?;
-    let mut renderer = Renderer::new(vulkan_gaurast::entry())?;
+    let entry = if options.is_empty() {
+        vulkan_gaurast::entry()
+    } else {
+        // SAFETY: the system's loader is sound.
+        unsafe { ash::Entry::load()? }
+    };
+    let mut renderer = Renderer::new(entry)?;
     let mut uploaded = renderer.upload(&scene, None)?;
     for (name, geometry) in [
         ("surfels.png", Geometry::Surfel),
@@ -56,7 +64,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         renderer.set(&mut uploaded, settings)?;
         let frame = renderer.render(&uploaded, &camera)?;
         gaurast_picture::write(
-            &Path::new(&folder).join(name),
+            &Path::new(folder).join(name),
             &frame.picture,
             Some([0.1; 3]),
         )?;

@@ -17,10 +17,12 @@ const FOG: [f32; 4] = [0.55, 0.62, 0.72, 1.0];
 
 #[rustfmt::skip] // A step a line, so that a screen or two show everything.
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let entry = vulkan_gaurast::entry();
-    // SAFETY: handles are used while they are valid, structures are valid, commands are in order, and the host touches
-    // memory only while the device is idle.
+    let through_loader = std::env::args().any(|argument| argument == "--loader");
+    // SAFETY: the system's loader is sound. Handles are used while they are valid, structures are valid, commands are
+    // in order, and the host touches memory only while the device is idle.
     unsafe {
+        let entry = if through_loader { ash::Entry::load()? } else { vulkan_gaurast::entry() };
+
         // A device with the extension.
         let app = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
         let info = vk::InstanceCreateInfo::default().application_info(&app);

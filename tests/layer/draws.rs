@@ -190,7 +190,7 @@ fn ranges() -> Vec<Mistake> {
         ),
         mistake(
             "more Gaussians than a draw may have",
-            "GAURAST-Draw-maxGaussiansPerDraw",
+            "VUID-vkCmdDraw-maxGaussiansPerDraw-90083",
             |stage| {
                 let pipeline = splats().create(&stage.full).expect("a pipeline");
                 let buffer = Buffer::of(&stage.full, &SPLAT);

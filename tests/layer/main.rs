@@ -4,6 +4,7 @@
 //! `unsafe` here has one reason throughout: these are Vulkan calls, and each test follows Vulkan's valid usage or breaks it in
 //! the one way that it is about, which the driver survives.
 
+mod before;
 mod cameras;
 mod contents;
 mod devices;

@@ -4,6 +4,8 @@ use std::path::Path;
 
 use gaurast_testkit::Message;
 
+use crate::before::BEFORE;
+
 /// A row: chapter, mistake, and what the driver and the layer say.
 type Row = (&'static str, &'static str, Option<Message>, Message);
 
@@ -39,7 +41,28 @@ fn page(rows: &[Row]) -> String {
             cell(&layer.text)
         );
     }
-    page
+    page + &before(rows)
+}
+
+const BEFORE_HEAD: &str = "\n## Before and after\n\n\
+    These were tried with revision 1 of the extension, when there was no layer. Of most of them the driver said nothing, or what\n\
+    did not help; what it and the layer say now is above.\n\n\
+    | mistake | the driver said | the driver now | the layer |\n|---|---|---|---|\n";
+
+/// The section of what was said of mistakes with revision 1.
+fn before(rows: &[Row]) -> String {
+    let mut section = BEFORE_HEAD.to_owned();
+    for (name, said) in BEFORE {
+        let row = rows.iter().find(|(_, mistake, ..)| mistake == name);
+        let (.., driver, layer) = row.unwrap_or_else(|| panic!("{name} is no mistake"));
+        let now = if driver.is_some() {
+            "says it"
+        } else {
+            "nothing"
+        };
+        section += &format!("| {} | {said} | {now} | `{}` |\n", cell(name), layer.id);
+    }
+    section
 }
 
 /// Compares the page with what was said, or writes it.

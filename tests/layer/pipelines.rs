@@ -301,20 +301,22 @@ fn fixed_functions() -> Vec<Mistake> {
         ),
         pipeline(
             "rasterizer discard",
-            "GAURAST-Pipeline-rasterizer-discard",
+            "VUID-VkGraphicsPipelineCreateInfo-rasterizerDiscardEnable-90080",
             raster(|raster| raster.rasterizer_discard_enable(true)),
         ),
         pipeline(
             "dynamic rasterizer discard",
-            "GAURAST-Pipeline-dynamic-state",
+            "VUID-VkGraphicsPipelineCreateInfo-pDynamicStates-90082",
             || splats().with_dynamic(vk::DynamicState::RASTERIZER_DISCARD_ENABLE),
         ),
-        pipeline("two viewports", "GAURAST-Pipeline-viewport-count", || {
-            Graphics {
+        pipeline(
+            "two viewports",
+            "VUID-VkGraphicsPipelineCreateInfo-viewportCount-90081",
+            || Graphics {
                 viewports: 2,
                 ..splats()
-            }
-        }),
+            },
+        ),
         pipeline(
             "a vertex binding whose stride is 0",
             "GAURAST-Pipeline-stride",

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use gaurast_runner::{Case, Need};
+use gaurast_runner::{Case, Need, Variant, built_example};
 use gaurast_testkit::loader::{layer_manifest, manifest};
 
 /// The page that prints the settings of the Khronos layer.
@@ -108,6 +108,51 @@ fn a_mistake_of_the_c_program_is_told_on_the_standard_error() {
     );
     assert!(text.contains("[GAURAST-Draw-behind-camera]"), "{text}");
     assert_eq!(text.lines().count(), 1, "{text}");
+}
+
+/// The samples in Rust, with their arguments, and what each leaves or says.
+const SAMPLES: [(&str, &[&str], Left); 6] = [
+    ("hello_gaussians", &[], Left::File("hello_gaussians.png")),
+    ("hello_triangle", &[], Left::File("hello_triangle.png")),
+    ("picking", &[], Left::Text(": Gaussian ")),
+    (
+        "wobbling_gaussians",
+        &[],
+        Left::File("wobbling_gaussians.png"),
+    ),
+    ("tilted_plane", &["."], Left::File("surfels.png")),
+    ("gallery", &["."], Left::File("GALLERY.md")),
+];
+
+/// A trace of a sample.
+enum Left {
+    File(&'static str),
+    Text(&'static str),
+}
+
+fn samples() -> Vec<Variant> {
+    SAMPLES.map(|(name, ..)| Variant::new(name)).into()
+}
+
+#[gaurast_runner::test(needs = [Need::ValidationLayer], each = samples())]
+fn nothing_is_said_of_the_samples(case: &Case) {
+    let sample = SAMPLES.iter().find(|(name, ..)| *name == case.variant());
+    let (name, arguments, left) = sample.expect("a sample");
+    let program = built_example("gaurast-examples", name);
+    let arguments = [*arguments, &["--loader"][..]].concat();
+    for layers in [OWN.to_owned(), format!("{OWN}:{KHRONOS}")] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let output = run(&program, &arguments, &layers, folder.path());
+        let text = said(&output);
+        assert!(output.stderr.is_empty(), "{layers}: {text}");
+        for layer in [OWN, KHRONOS, "VUID"] {
+            assert!(!text.contains(layer), "{layers}: {text}");
+        }
+        match left {
+            Left::File(file) => assert!(folder.path().join(file).exists(), "{file}"),
+            Left::Text(words) => assert!(text.contains(words), "{text}"),
+        }
+    }
 }
 
 /// The renderer of the `gaurast` command, which uploads through a staging buffer.

@@ -3,6 +3,7 @@
 use gaurast_runner::{Case, Need, Variant, shards};
 use gaurast_testkit::Gpu;
 use gaurast_tests::triangles::checksum::{Checksums, first_difference, numbers};
+use gaurast_tests::triangles::clipped::{KINDS, SIZE as SMALL, clipped, places};
 use gaurast_tests::triangles::edges::{Position, is_near, lines, to_clip};
 use gaurast_tests::triangles::shapes;
 use rand::Rng;
@@ -16,14 +17,6 @@ type Triangle = [[f32; 4]; 3];
 
 /// The side of the square target in pixels.
 const SIZE: u32 = 512;
-
-/// The sample positions in a pixel, in sixteenths, for one sample or four.
-fn places(samples: u32) -> &'static [[u32; 2]] {
-    match samples {
-        1 => &[[8, 8]],
-        _ => &[[6, 2], [14, 6], [2, 10], [10, 14]],
-    }
-}
 
 /// A generator of triangles of one kind: three points in pixels.
 type Kind = fn(&mut ChaCha8Rng) -> [[f32; 2]; 3];
@@ -155,62 +148,6 @@ fn a_million_triangles_cover_the_same_samples(case: &Case) {
     quarter_of_a_million(case, 4);
 }
 
-/// The side of the square target in pixels, for clipped triangles.
-const SMALL: u32 = 256;
-
-/// A generator of a corner of a triangle that some planes cut.
-type Plane = fn(&mut ChaCha8Rng) -> Position;
-
-/// Triangles that some planes cut, in units of 1/64.
-fn clipped(seed: u64, count: usize, plane: Plane) -> Vec<[Position; 3]> {
-    let mut rng = shapes::rng(seed);
-    (0..count)
-        .map(|_| [0; 3].map(|_| plane(&mut rng)))
-        .collect()
-}
-
-/// A random position with `w` between 1/16 and 4, and with `x` and `y` inside the side planes, unless `wide` is set.
-fn position(rng: &mut ChaCha8Rng, wide: [bool; 2]) -> Position {
-    let w = rng.random_range(32..256);
-    let [x, y] = wide.map(|wide| {
-        let reach = if wide { 3 * w } else { w };
-        rng.random_range(-reach..=reach)
-    });
-    [x, y, rng.random_range(0..=w), w]
-}
-
-fn left_and_right(rng: &mut ChaCha8Rng) -> Position {
-    position(rng, [true, false])
-}
-
-fn top_and_bottom(rng: &mut ChaCha8Rng) -> Position {
-    position(rng, [false, true])
-}
-
-fn far_plane(rng: &mut ChaCha8Rng) -> Position {
-    let [x, y, _, w] = position(rng, [false, false]);
-    [x, y, rng.random_range(0..2 * w), w]
-}
-
-fn near_plane(rng: &mut ChaCha8Rng) -> Position {
-    let [x, y, _, w] = position(rng, [false, false]);
-    [x, y, rng.random_range(-w..w), w]
-}
-
-/// A random position, for some corners behind the eye, as a perspective projection gives it.
-fn behind_the_eye(rng: &mut ChaCha8Rng) -> Position {
-    let w = rng.random_range(-128..256);
-    let [x, y] = [0; 2].map(|_| rng.random_range(-256..=256));
-    // The near plane is at w = 1/2.
-    [x, y, w - 32, w]
-}
-
-fn all_planes(rng: &mut ChaCha8Rng) -> Position {
-    let w = rng.random_range(-64..256i64);
-    let [x, y] = [0; 2].map(|_| rng.random_range(-512..=512));
-    [x, y, w - 32 + rng.random_range(-8..=8), w]
-}
-
 /// True if triangles with an edge near the sample explain the difference of the sums: some of them cover the sample on
 /// one device only.
 fn is_explained(
@@ -243,25 +180,13 @@ fn is_sum(numbers: &[[f32; 4]], sum: [f32; 4]) -> bool {
     })
 }
 
-/// The clip planes of the view volume, each with a name, a seed, and a generator of corners.
-const PLANES: [(&str, u64, Plane); 6] = [
-    ("left and right", 210, left_and_right),
-    ("top and bottom", 211, top_and_bottom),
-    ("near", 212, near_plane),
-    ("far", 213, far_plane),
-    ("behind the eye", 214, behind_the_eye),
-    ("all", 215, all_planes),
-];
-
 fn planes() -> Vec<Variant> {
-    PLANES.map(|(name, ..)| Variant::new(name)).into()
+    KINDS.map(|(name, ..)| Variant::new(name)).into()
 }
 
 #[gaurast_runner::test(needs = [GLSLANG, Need::Lavapipe], each = planes())]
 fn clipped_triangles_cover_the_same_samples_but_at_edges(case: &Case) {
-    let planes = PLANES
-        .into_iter()
-        .find(|(name, ..)| *name == case.variant());
+    let planes = KINDS.into_iter().find(|(name, ..)| *name == case.variant());
     let (_, seed, plane) = planes.expect("planes");
     for samples in [1, 4] {
         let positions = clipped(seed, 1000, plane);

@@ -130,7 +130,7 @@ fn what_is_not_there_is_refused() {
     let Message { id, text } = &messages[0];
     assert_eq!(id, "GAURAST-error");
     assert!(
-        text.contains("vkCreateDevice") && text.contains("tessellation_shader"),
+        text.contains("vkCreateDevice") && text.contains("tessellationShader"),
         "{text}"
     );
 

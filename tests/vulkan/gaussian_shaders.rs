@@ -528,3 +528,49 @@ fn a_stage_is_needed() {
     let id = "VUID-VkGraphicsPipelineCreateInfo-projectionMode-90008";
     assert!(messages.contains(id), "{messages:?}");
 }
+
+/// Pipeline statistics count the invocations of shaders, and nothing of what is done without one.
+#[gaurast_runner::test]
+fn pipeline_statistics_count_shaders() {
+    use vk::QueryPipelineStatisticFlags as Flags;
+    let stage = Stage::new();
+    let device = stage.canvas.gpu.device();
+    let statistics = Flags::INPUT_ASSEMBLY_VERTICES
+        | Flags::INPUT_ASSEMBLY_PRIMITIVES
+        | Flags::VERTEX_SHADER_INVOCATIONS
+        | Flags::CLIPPING_INVOCATIONS
+        | Flags::CLIPPING_PRIMITIVES
+        | Flags::FRAGMENT_SHADER_INVOCATIONS;
+    let info = vk::QueryPoolCreateInfo::default()
+        .query_type(vk::QueryType::PIPELINE_STATISTICS)
+        .pipeline_statistics(statistics)
+        .query_count(1);
+    // SAFETY: see the crate.
+    let pool = unsafe { device.create_query_pool(&info, None) }.unwrap();
+    let count = |request: Graphics<'static>| {
+        // SAFETY: see the crate.
+        unsafe { device.reset_query_pool(pool, 0, 1) };
+        let pixels = stage.draw(request, |device, commands| {
+            // SAFETY: see the crate.
+            unsafe { device.cmd_begin_query(commands, pool, 0, vk::QueryControlFlags::empty()) };
+            draw_all(device, commands);
+            // SAFETY: see the crate.
+            unsafe { device.cmd_end_query(commands, pool, 0) };
+        });
+        let mut results = [[0u64; 6]];
+        let flags = vk::QueryResultFlags::WAIT | vk::QueryResultFlags::TYPE_64;
+        // SAFETY: see the crate.
+        unsafe { device.get_query_pool_results(pool, 0, &mut results, flags) }.unwrap();
+        let covered = pixels.iter().filter(|pixel| pixel[3] > 0.0).count() as u64;
+        (results[0], covered)
+    };
+    let (none, _) = count(request(false));
+    assert_eq!(none, [0; 6]);
+    let (projected, _) = count(request(true));
+    assert_eq!(projected, [0, 0, u64::from(COUNT), 0, 0, 0]);
+    let (resolved, covered) = count(stage.resolved(request(false), &stage.toned, [0, 1]));
+    assert!(covered > 1500, "{covered}");
+    assert_eq!(resolved, [0, 0, 0, 0, 0, covered]);
+    // SAFETY: see the crate.
+    unsafe { device.destroy_query_pool(pool, None) };
+}

@@ -114,6 +114,24 @@ fn pipelines() -> Vec<(&'static str, Graphics<'static>)> {
     let buffer = GaussianCameraSourceGAURAST::UNIFORM_BUFFER;
     vec![
         (
+            "VUID-VkGraphicsPipelineCreateInfo-rasterizerDiscardEnable-90080",
+            Graphics {
+                raster: splats().raster.rasterizer_discard_enable(true),
+                ..splats()
+            },
+        ),
+        (
+            "VUID-VkGraphicsPipelineCreateInfo-viewportCount-90081",
+            Graphics {
+                viewports: 2,
+                ..splats()
+            },
+        ),
+        (
+            "VUID-VkGraphicsPipelineCreateInfo-pDynamicStates-90082",
+            splats().with_dynamic(vk::DynamicState::RASTERIZER_DISCARD_ENABLE),
+        ),
+        (
             "VUID-VkGraphicsPipelineCreateInfo-topology-90007",
             Graphics {
                 gaussian: None,
@@ -394,6 +412,7 @@ fn every_statement_is_reported_by_its_id() {
         heard(id, gpu.message_texts().concat());
     }
     heard("VUID-vkCmdDraw-geometry-90071", flat_through_a_fisheye());
+    heard("VUID-vkCmdDraw-maxGaussiansPerDraw-90083", too_many());
     let bare = without_modes();
     let absent = vk::Result::ERROR_FEATURE_NOT_PRESENT;
     let stated = stated();
@@ -420,6 +439,17 @@ fn every_statement_is_reported_by_its_id() {
     tested.insert("VUID-VkGaussianCameraGAURAST-model-90079");
     let untested: Vec<_> = stated.difference(&tested).collect();
     assert!(untested.is_empty(), "no test breaks {untested:?}");
+}
+
+/// The messages of a draw of more Gaussians than there may be, which draws nothing.
+fn too_many() -> String {
+    let scene = Scene::new(&[splat([0.0, 0.0, 5.0], 0.1, 0.8, [0.5; 3])], &splats());
+    let pixels = scene.draw([0.25; 4], |device, commands| {
+        // SAFETY: see the crate.
+        unsafe { device.cmd_draw(commands, u32::MAX, 2, 0, 0) };
+    });
+    assert!(pixels.iter().all(|pixel| *pixel == [0.25; 4]));
+    scene.gpu.message_texts().concat()
 }
 
 /// The messages of a draw of 2D Gaussians through a fisheye, which draws nothing.

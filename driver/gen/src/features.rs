@@ -6,7 +6,7 @@ use crate::error::Error;
 use crate::registry::{Registry, by_version};
 use crate::rust;
 use crate::support::{Features, Support};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::fmt::Write;
 
 /// A feature: its name in the registry and its name in Rust.
@@ -102,7 +102,7 @@ pub(crate) fn write(
     for (name, field) in &features {
         let _ = writeln!(fields, "/// `{name}`.\npub(crate) {field}: bool,");
         let _ = writeln!(none, "{field}: false,");
-        let _ = writeln!(list, "(\"{field}\", self.{field}),");
+        let _ = writeln!(list, "(\"{name}\", self.{field}),");
         if supported.contains(name) {
             let _ = writeln!(works, "{field}: true,");
         }
@@ -164,7 +164,7 @@ pub(crate) fn write(
                 /// No feature.
                 pub(crate) const NONE: Self = Self {{ {none} }};
 
-                /// The features by their names in Rust.
+                /// The features by their names.
                 pub(crate) fn list(&self) -> [(&'static str, bool); {count}] {{ [{list}] }}
 
                 /// The features of the core structure.
@@ -187,7 +187,7 @@ pub(crate) fn write(
                 match structure {{ {extensions} _ => None }}
             }}
 
-            /// The features that Vulkan makes mandatory, by the core version that does, and their names in Rust.
+            /// The features that Vulkan makes mandatory, by the core version that does, and their names.
             #[cfg(test)]
             pub(crate) const MANDATORY: &[(u32, &[&str])] = &[{mandatory}];
             ",
@@ -202,7 +202,7 @@ fn mandatory(
     support: &Support,
     features: &[Feature<'_>],
 ) -> Result<String, Error> {
-    let rust: BTreeMap<&str, &str> = features.iter().copied().collect();
+    let known: BTreeSet<&str> = features.iter().map(|(name, _)| *name).collect();
     let mut text = String::new();
     let newest = support.version()?;
     let conditional = |requirement: &crate::registry::Requirement<_>| {
@@ -217,7 +217,7 @@ fn mandatory(
     }) {
         let names: BTreeSet<&str> = required
             .into_iter()
-            .filter_map(|(_, name)| rust.get(name.as_str()).copied())
+            .filter_map(|(_, name)| known.get(name.as_str()).copied())
             .collect();
         let names: String = names.iter().map(|name| format!("\"{name}\",")).collect();
         let _ = writeln!(text, "(vk::API_VERSION_{major}_{minor}, &[{names}]),");

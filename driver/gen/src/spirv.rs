@@ -15,7 +15,6 @@ use vk_parse::Enable;
 /// The part of the driver's support that may enable a capability.
 struct Known<'a> {
     registry: &'a Registry,
-    declarations: &'a Declarations,
     support: &'a Support,
     features: Vec<Chained<'a>>,
     properties: Vec<Chained<'a>>,
@@ -28,7 +27,6 @@ pub(crate) fn write(
 ) -> Result<String, Error> {
     let known = Known {
         registry,
-        declarations,
         support,
         features: features::structures(registry, declarations, support)?,
         properties: properties::structures(registry, declarations, support)?,
@@ -118,14 +116,10 @@ impl Known<'_> {
             .iter()
             .find(|chained| chained.name == structure)
             .and_then(|chained| member(chained, &enable.feature));
+        let name = &enable.feature;
         match field {
-            Some(field) => format!("Enable::Feature(\"{field}\", |f| f.{field})"),
-            None => absent(
-                Chained::new(self.registry, self.declarations, structure, None)
-                    .ok()
-                    .and_then(|chained| member(&chained, &enable.feature))
-                    .unwrap_or(&enable.feature),
-            ),
+            Some(field) => format!("Enable::Feature(\"{name}\", |f| f.{field})"),
+            None => absent(name),
         }
     }
 
@@ -155,7 +149,8 @@ impl Known<'_> {
                 }
             }
         };
-        Ok(format!("Enable::Property(\"{field}\", |p| {condition})"))
+        let name = &enable.member;
+        Ok(format!("Enable::Property(\"{name}\", |p| {condition})"))
     }
 }
 

@@ -29,7 +29,7 @@ const VENDOR_ID: u32 = 0;
 const DEVICE_ID: u32 = 1;
 
 /// The most Gaussians of one draw or one sorted set: their numbers have 32 bits.
-const MAX_GAUSSIANS: u64 = u32::MAX as u64;
+pub(crate) const MAX_GAUSSIANS: u64 = u32::MAX as u64;
 
 /// The greatest degree of spherical harmonics of a pipeline.
 pub(crate) const MAX_SPHERICAL_HARMONICS_DEGREE: u32 = 4;

@@ -182,46 +182,46 @@ dynamic_states! {
         set |state| state.set_gaussian(|own| own.approximation.contribution_budget = budget),
         needed Fixed::draws_gaussians, gaussians Taken;
     DEPTH_CLAMP_ENABLE_EXT => DepthClampEnable(enable: bool),
-        set |state| state.draw.depth_clamp = enable, needed Fixed::rasterizes, gaussians Refused;
+        set |state| state.draw.depth_clamp = enable, needed Fixed::rasterizes, gaussians Ignored;
     DEPTH_CLIP_ENABLE_EXT => DepthClipEnable(enable: bool),
-        set |state| state.draw.depth_clip = Some(enable), needed Fixed::rasterizes, gaussians Refused;
+        set |state| state.draw.depth_clip = Some(enable), needed Fixed::rasterizes, gaussians Ignored;
     DEPTH_CLIP_NEGATIVE_ONE_TO_ONE_EXT => DepthClipNegativeOneToOne(enable: bool),
         set |state| state.draw.negative_one_to_one = enable, needed Fixed::rasterizes, gaussians Taken;
     POLYGON_MODE_EXT => PolygonMode(mode: PolygonMode),
-        set |state| state.draw.polygon_mode = mode, needed Fixed::rasterizes, gaussians Refused;
+        set |state| state.draw.polygon_mode = mode, needed Fixed::rasterizes, gaussians Ignored;
     PROVOKING_VERTEX_MODE_EXT => ProvokingVertexMode(mode: vk::ProvokingVertexModeEXT),
         set |state| state.draw.provoking_last = mode == vk::ProvokingVertexModeEXT::LAST_VERTEX,
-        needed Fixed::rasterizes, gaussians Refused;
+        needed Fixed::rasterizes, gaussians Ignored;
     LINE_RASTERIZATION_MODE_EXT => LineRasterizationMode(mode: vk::LineRasterizationModeEXT),
-        set |_| { let _ = mode; }, needed |_| false, gaussians Refused;
+        set |_| { let _ = mode; }, needed |_| false, gaussians Ignored;
     LINE_STIPPLE_ENABLE_EXT => LineStippleEnable(enable: bool),
-        set |_| { let _ = enable; }, needed |_| false, gaussians Refused;
+        set |_| { let _ = enable; }, needed |_| false, gaussians Ignored;
     SAMPLE_MASK_EXT => SampleMask(mask: u32),
-        set |state| state.draw.sample_mask = mask, needed Fixed::rasterizes, gaussians Refused;
+        set |state| state.draw.sample_mask = mask, needed Fixed::rasterizes, gaussians Taken;
     ALPHA_TO_COVERAGE_ENABLE_EXT => AlphaToCoverageEnable(enable: bool),
         set |state| state.draw.alpha_to_coverage = enable, needed Fixed::rasterizes, gaussians Refused;
     ALPHA_TO_ONE_ENABLE_EXT => AlphaToOneEnable(enable: bool),
         set |state| state.draw.alpha_to_one = enable, needed Fixed::rasterizes, gaussians Refused;
     LOGIC_OP_EXT => LogicOp(op: LogicOp),
-        set |state| state.logic_op = op, needed Fixed::operates, gaussians Refused;
+        set |state| state.logic_op = op, needed Fixed::operates, gaussians Taken;
     LOGIC_OP_ENABLE_EXT => LogicOpEnable(enable: bool),
-        set |state| state.logic_op_enable = enable, needed Fixed::has_colors, gaussians Refused;
+        set |state| state.logic_op_enable = enable, needed Fixed::has_colors, gaussians Taken;
     COLOR_BLEND_ENABLE_EXT => ColorBlendEnable[attachment](enable: bool),
         set |state| state.set_attachment(attachment, |it| it.blend_enable = enable),
-        needed Fixed::has_colors, gaussians Refused;
+        needed Fixed::has_colors, gaussians Taken;
     COLOR_BLEND_EQUATION_EXT => ColorBlendEquation[attachment](equations: BlendEquations),
         set |state| state.set_attachment(attachment, |it| it.equations = equations),
-        needed Fixed::blends, gaussians Refused;
+        needed Fixed::blends, gaussians Taken;
     COLOR_WRITE_MASK_EXT => ColorWriteMask[attachment](mask: u8),
         set |state| state.set_attachment(attachment, |it| it.write_mask = mask),
-        needed Fixed::has_colors, gaussians Refused;
+        needed Fixed::has_colors, gaussians Taken;
     COLOR_WRITE_ENABLE_EXT => ColorWriteEnable[attachment](enable: bool),
         set |state| state.set_attachment(attachment, |it| it.write_enable = enable),
-        needed Fixed::has_colors, gaussians Refused;
+        needed Fixed::has_colors, gaussians Taken;
 }
 
 /// The dynamic states that are looked up for each draw, and for which no row has a value: viewports, scissors, strides
-/// and vertex input; and the stipple of lines, which is unused. For Gaussians all but the last two are allowed.
+/// and vertex input; and the stipple of lines, which is unused. For Gaussians all but vertex input are allowed.
 const LOOKED_UP: [vk::DynamicState; 7] = [
     vk::DynamicState::VIEWPORT,
     vk::DynamicState::VIEWPORT_WITH_COUNT,
@@ -253,9 +253,10 @@ pub(crate) fn is_taken_by_gaussians(state: vk::DynamicState) -> bool {
 
 /// Reports whether a state may be dynamic in a Gaussian pipeline.
 pub(crate) fn may_gaussians_have(state: vk::DynamicState) -> bool {
-    row(state).map_or(LOOKED_UP[..5].contains(&state), |row| {
-        row.gaussians != Gaussians::Refused
-    })
+    match row(state) {
+        Some(row) => row.gaussians != Gaussians::Refused,
+        None => state != vk::DynamicState::VERTEX_INPUT_EXT && LOOKED_UP.contains(&state),
+    }
 }
 
 /// The faces of a mask.
@@ -338,12 +339,15 @@ mod tests {
         assert!(all().all(is_supported));
         assert!(!is_supported(S::RASTERIZATION_SAMPLES_EXT));
         let taken = all().filter(|&state| is_taken_by_gaussians(state));
-        assert_eq!(taken.count(), 21);
-        let refused = all().filter(|&state| !may_gaussians_have(state));
-        let refused: Vec<_> = refused.collect();
-        let expected = [S::PRIMITIVE_RESTART_ENABLE, S::RASTERIZER_DISCARD_ENABLE];
-        assert_eq!(refused[..2], expected);
-        // VK_EXT_extended_dynamic_state3 and what comes with it, but for the depths of clip space.
-        assert_eq!(refused.len(), 19);
+        assert_eq!(taken.count(), 28);
+        let refused: Vec<_> = all().filter(|&state| !may_gaussians_have(state)).collect();
+        let expected = [
+            S::PRIMITIVE_RESTART_ENABLE,
+            S::RASTERIZER_DISCARD_ENABLE,
+            S::ALPHA_TO_COVERAGE_ENABLE_EXT,
+            S::ALPHA_TO_ONE_ENABLE_EXT,
+            S::VERTEX_INPUT_EXT,
+        ];
+        assert_eq!(refused, expected);
     }
 }

@@ -1064,7 +1064,10 @@ impl FixedFunctionState {
     pub(crate) fn gaussian_state(&self) -> GaussianState {
         let converted = self.draw_state();
         GaussianState {
+            sample_mask: converted.sample_mask,
             depth_stencil: converted.depth_stencil,
+            logic_op: converted.logic_op,
+            blend: converted.blend,
             blend_constants: converted.blend_constants,
             negative_one_to_one: converted.negative_one_to_one,
             ..self.gaussian.as_deref().cloned().unwrap_or_default()

@@ -26,153 +26,149 @@ pub(crate) enum Enable {
 /// capabilities that Vulkan doesn't know.
 pub(crate) fn enables(capability: Capability) -> &'static [Enable] {
     match capability {
-        Capability::Geometry => &[Enable::Feature("geometry_shader", |f| f.geometry_shader)],
-        Capability::Tessellation => &[Enable::Feature("tessellation_shader", |f| {
+        Capability::Geometry => &[Enable::Feature("geometryShader", |f| f.geometry_shader)],
+        Capability::Tessellation => &[Enable::Feature("tessellationShader", |f| {
             f.tessellation_shader
         })],
-        Capability::Float64 => &[Enable::Feature("shader_float64", |f| f.shader_float64)],
-        Capability::Int64 => &[Enable::Feature("shader_int64", |f| f.shader_int64)],
+        Capability::Float64 => &[Enable::Feature("shaderFloat64", |f| f.shader_float64)],
+        Capability::Int64 => &[Enable::Feature("shaderInt64", |f| f.shader_int64)],
         Capability::Int64Atomics => &[
-            Enable::Feature("shader_buffer_int64_atomics", |f| {
+            Enable::Feature("shaderBufferInt64Atomics", |f| {
                 f.shader_buffer_int64_atomics
             }),
-            Enable::Feature("shader_shared_int64_atomics", |f| {
+            Enable::Feature("shaderSharedInt64Atomics", |f| {
                 f.shader_shared_int64_atomics
             }),
-            Enable::Absent("shader_image_int64_atomics"),
+            Enable::Absent("shaderImageInt64Atomics"),
         ],
         Capability::AtomicFloat16AddEXT => &[
-            Enable::Feature("shader_buffer_float16_atomic_add", |f| {
+            Enable::Feature("shaderBufferFloat16AtomicAdd", |f| {
                 f.shader_buffer_float16_atomic_add
             }),
-            Enable::Feature("shader_shared_float16_atomic_add", |f| {
+            Enable::Feature("shaderSharedFloat16AtomicAdd", |f| {
                 f.shader_shared_float16_atomic_add
             }),
         ],
         Capability::AtomicFloat32AddEXT => &[
-            Enable::Feature("shader_buffer_float32_atomic_add", |f| {
+            Enable::Feature("shaderBufferFloat32AtomicAdd", |f| {
                 f.shader_buffer_float32_atomic_add
             }),
-            Enable::Feature("shader_shared_float32_atomic_add", |f| {
+            Enable::Feature("shaderSharedFloat32AtomicAdd", |f| {
                 f.shader_shared_float32_atomic_add
             }),
-            Enable::Feature("shader_image_float32_atomic_add", |f| {
+            Enable::Feature("shaderImageFloat32AtomicAdd", |f| {
                 f.shader_image_float32_atomic_add
             }),
         ],
         Capability::AtomicFloat64AddEXT => &[
-            Enable::Feature("shader_buffer_float64_atomic_add", |f| {
+            Enable::Feature("shaderBufferFloat64AtomicAdd", |f| {
                 f.shader_buffer_float64_atomic_add
             }),
-            Enable::Feature("shader_shared_float64_atomic_add", |f| {
+            Enable::Feature("shaderSharedFloat64AtomicAdd", |f| {
                 f.shader_shared_float64_atomic_add
             }),
         ],
         Capability::AtomicFloat16MinMaxEXT => &[
-            Enable::Feature("shader_buffer_float16_atomic_min_max", |f| {
+            Enable::Feature("shaderBufferFloat16AtomicMinMax", |f| {
                 f.shader_buffer_float16_atomic_min_max
             }),
-            Enable::Feature("shader_shared_float16_atomic_min_max", |f| {
+            Enable::Feature("shaderSharedFloat16AtomicMinMax", |f| {
                 f.shader_shared_float16_atomic_min_max
             }),
         ],
         Capability::AtomicFloat32MinMaxEXT => &[
-            Enable::Feature("shader_buffer_float32_atomic_min_max", |f| {
+            Enable::Feature("shaderBufferFloat32AtomicMinMax", |f| {
                 f.shader_buffer_float32_atomic_min_max
             }),
-            Enable::Feature("shader_shared_float32_atomic_min_max", |f| {
+            Enable::Feature("shaderSharedFloat32AtomicMinMax", |f| {
                 f.shader_shared_float32_atomic_min_max
             }),
-            Enable::Feature("shader_image_float32_atomic_min_max", |f| {
+            Enable::Feature("shaderImageFloat32AtomicMinMax", |f| {
                 f.shader_image_float32_atomic_min_max
             }),
         ],
         Capability::AtomicFloat64MinMaxEXT => &[
-            Enable::Feature("shader_buffer_float64_atomic_min_max", |f| {
+            Enable::Feature("shaderBufferFloat64AtomicMinMax", |f| {
                 f.shader_buffer_float64_atomic_min_max
             }),
-            Enable::Feature("shader_shared_float64_atomic_min_max", |f| {
+            Enable::Feature("shaderSharedFloat64AtomicMinMax", |f| {
                 f.shader_shared_float64_atomic_min_max
             }),
         ],
-        Capability::AtomicFloat16VectorNV => &[Enable::Absent("shader_float16_vector_atomics")],
-        Capability::Int64ImageEXT => &[Enable::Absent("shader_image_int64_atomics")],
-        Capability::Int16 => &[Enable::Feature("shader_int16", |f| f.shader_int16)],
+        Capability::AtomicFloat16VectorNV => &[Enable::Absent("shaderFloat16VectorAtomics")],
+        Capability::Int64ImageEXT => &[Enable::Absent("shaderImageInt64Atomics")],
+        Capability::Int16 => &[Enable::Feature("shaderInt16", |f| f.shader_int16)],
         Capability::TessellationPointSize => &[Enable::Feature(
-            "shader_tessellation_and_geometry_point_size",
+            "shaderTessellationAndGeometryPointSize",
             |f| f.shader_tessellation_and_geometry_point_size,
         )],
         Capability::GeometryPointSize => &[Enable::Feature(
-            "shader_tessellation_and_geometry_point_size",
+            "shaderTessellationAndGeometryPointSize",
             |f| f.shader_tessellation_and_geometry_point_size,
         )],
-        Capability::ImageGatherExtended => {
-            &[Enable::Feature("shader_image_gather_extended", |f| {
-                f.shader_image_gather_extended
-            })]
-        }
+        Capability::ImageGatherExtended => &[Enable::Feature("shaderImageGatherExtended", |f| {
+            f.shader_image_gather_extended
+        })],
         Capability::StorageImageMultisample => {
-            &[Enable::Feature("shader_storage_image_multisample", |f| {
+            &[Enable::Feature("shaderStorageImageMultisample", |f| {
                 f.shader_storage_image_multisample
             })]
         }
         Capability::UniformBufferArrayDynamicIndexing => &[Enable::Feature(
-            "shader_uniform_buffer_array_dynamic_indexing",
+            "shaderUniformBufferArrayDynamicIndexing",
             |f| f.shader_uniform_buffer_array_dynamic_indexing,
         )],
         Capability::SampledImageArrayDynamicIndexing => &[Enable::Feature(
-            "shader_sampled_image_array_dynamic_indexing",
+            "shaderSampledImageArrayDynamicIndexing",
             |f| f.shader_sampled_image_array_dynamic_indexing,
         )],
         Capability::StorageBufferArrayDynamicIndexing => &[Enable::Feature(
-            "shader_storage_buffer_array_dynamic_indexing",
+            "shaderStorageBufferArrayDynamicIndexing",
             |f| f.shader_storage_buffer_array_dynamic_indexing,
         )],
         Capability::StorageImageArrayDynamicIndexing => &[Enable::Feature(
-            "shader_storage_image_array_dynamic_indexing",
+            "shaderStorageImageArrayDynamicIndexing",
             |f| f.shader_storage_image_array_dynamic_indexing,
         )],
-        Capability::ClipDistance => &[Enable::Feature("shader_clip_distance", |f| {
+        Capability::ClipDistance => &[Enable::Feature("shaderClipDistance", |f| {
             f.shader_clip_distance
         })],
-        Capability::CullDistance => &[Enable::Feature("shader_cull_distance", |f| {
+        Capability::CullDistance => &[Enable::Feature("shaderCullDistance", |f| {
             f.shader_cull_distance
         })],
-        Capability::ImageCubeArray => {
-            &[Enable::Feature("image_cube_array", |f| f.image_cube_array)]
-        }
-        Capability::SampleRateShading => &[Enable::Feature("sample_rate_shading", |f| {
+        Capability::ImageCubeArray => &[Enable::Feature("imageCubeArray", |f| f.image_cube_array)],
+        Capability::SampleRateShading => &[Enable::Feature("sampleRateShading", |f| {
             f.sample_rate_shading
         })],
-        Capability::SparseResidency => &[Enable::Feature("shader_resource_residency", |f| {
+        Capability::SparseResidency => &[Enable::Feature("shaderResourceResidency", |f| {
             f.shader_resource_residency
         })],
-        Capability::MinLod => &[Enable::Feature("shader_resource_min_lod", |f| {
+        Capability::MinLod => &[Enable::Feature("shaderResourceMinLod", |f| {
             f.shader_resource_min_lod
         })],
         Capability::SampledCubeArray => {
-            &[Enable::Feature("image_cube_array", |f| f.image_cube_array)]
+            &[Enable::Feature("imageCubeArray", |f| f.image_cube_array)]
         }
-        Capability::ImageMSArray => &[Enable::Feature("shader_storage_image_multisample", |f| {
+        Capability::ImageMSArray => &[Enable::Feature("shaderStorageImageMultisample", |f| {
             f.shader_storage_image_multisample
         })],
-        Capability::InterpolationFunction => &[Enable::Feature("sample_rate_shading", |f| {
+        Capability::InterpolationFunction => &[Enable::Feature("sampleRateShading", |f| {
             f.sample_rate_shading
         })],
-        Capability::MultiViewport => &[Enable::Feature("multi_viewport", |f| f.multi_viewport)],
+        Capability::MultiViewport => &[Enable::Feature("multiViewport", |f| f.multi_viewport)],
         Capability::DrawParameters => &[
-            Enable::Feature("shader_draw_parameters", |f| f.shader_draw_parameters),
+            Enable::Feature("shaderDrawParameters", |f| f.shader_draw_parameters),
             Enable::Extension(c"VK_KHR_shader_draw_parameters"),
         ],
         Capability::MultiView => &[Enable::Feature("multiview", |f| f.multiview)],
         Capability::VariablePointersStorageBuffer => {
-            &[Enable::Feature("variable_pointers_storage_buffer", |f| {
+            &[Enable::Feature("variablePointersStorageBuffer", |f| {
                 f.variable_pointers_storage_buffer
             })]
         }
-        Capability::VariablePointers => &[Enable::Feature("variable_pointers", |f| {
-            f.variable_pointers
-        })],
+        Capability::VariablePointers => {
+            &[Enable::Feature("variablePointers", |f| f.variable_pointers)]
+        }
         Capability::ShaderClockKHR => &[Enable::Absent("VK_KHR_shader_clock")],
         Capability::StencilExportEXT => &[Enable::Absent("VK_EXT_shader_stencil_export")],
         Capability::ImageReadWriteLodAMD => &[Enable::Absent("VK_AMD_shader_image_load_store_lod")],
@@ -184,12 +180,10 @@ pub(crate) fn enables(capability: Capability) -> &'static [Enable] {
         Capability::GeometryShaderPassthroughNV => {
             &[Enable::Absent("VK_NV_geometry_shader_passthrough")]
         }
-        Capability::ShaderViewportIndex => {
-            &[Enable::Feature("shader_output_viewport_index", |f| {
-                f.shader_output_viewport_index
-            })]
-        }
-        Capability::ShaderLayer => &[Enable::Feature("shader_output_layer", |f| {
+        Capability::ShaderViewportIndex => &[Enable::Feature("shaderOutputViewportIndex", |f| {
+            f.shader_output_viewport_index
+        })],
+        Capability::ShaderLayer => &[Enable::Feature("shaderOutputLayer", |f| {
             f.shader_output_layer
         })],
         Capability::ShaderViewportMaskNV => &[Enable::Absent("VK_NV_viewport_array2")],
@@ -197,62 +191,63 @@ pub(crate) fn enables(capability: Capability) -> &'static [Enable] {
             &[Enable::Absent("VK_NVX_multiview_per_view_attributes")]
         }
         Capability::StorageBuffer16BitAccess => {
-            &[Enable::Feature("storage_buffer16_bit_access", |f| {
+            &[Enable::Feature("storageBuffer16BitAccess", |f| {
                 f.storage_buffer16_bit_access
             })]
         }
-        Capability::UniformAndStorageBuffer16BitAccess => &[Enable::Feature(
-            "uniform_and_storage_buffer16_bit_access",
-            |f| f.uniform_and_storage_buffer16_bit_access,
-        )],
-        Capability::StoragePushConstant16 => &[Enable::Feature("storage_push_constant16", |f| {
+        Capability::UniformAndStorageBuffer16BitAccess => {
+            &[Enable::Feature("uniformAndStorageBuffer16BitAccess", |f| {
+                f.uniform_and_storage_buffer16_bit_access
+            })]
+        }
+        Capability::StoragePushConstant16 => &[Enable::Feature("storagePushConstant16", |f| {
             f.storage_push_constant16
         })],
-        Capability::StorageInputOutput16 => &[Enable::Feature("storage_input_output16", |f| {
+        Capability::StorageInputOutput16 => &[Enable::Feature("storageInputOutput16", |f| {
             f.storage_input_output16
         })],
-        Capability::GroupNonUniform => &[Enable::Property("subgroup_supported_operations", |p| {
+        Capability::GroupNonUniform => &[Enable::Property("subgroupSupportedOperations", |p| {
             p.subgroup_supported_operations
                 .contains(vk::SubgroupFeatureFlags::BASIC)
         })],
         Capability::GroupNonUniformVote => {
-            &[Enable::Property("subgroup_supported_operations", |p| {
+            &[Enable::Property("subgroupSupportedOperations", |p| {
                 p.subgroup_supported_operations
                     .contains(vk::SubgroupFeatureFlags::VOTE)
             })]
         }
         Capability::GroupNonUniformArithmetic => {
-            &[Enable::Property("subgroup_supported_operations", |p| {
+            &[Enable::Property("subgroupSupportedOperations", |p| {
                 p.subgroup_supported_operations
                     .contains(vk::SubgroupFeatureFlags::ARITHMETIC)
             })]
         }
         Capability::GroupNonUniformBallot => {
-            &[Enable::Property("subgroup_supported_operations", |p| {
+            &[Enable::Property("subgroupSupportedOperations", |p| {
                 p.subgroup_supported_operations
                     .contains(vk::SubgroupFeatureFlags::BALLOT)
             })]
         }
         Capability::GroupNonUniformShuffle => {
-            &[Enable::Property("subgroup_supported_operations", |p| {
+            &[Enable::Property("subgroupSupportedOperations", |p| {
                 p.subgroup_supported_operations
                     .contains(vk::SubgroupFeatureFlags::SHUFFLE)
             })]
         }
         Capability::GroupNonUniformShuffleRelative => {
-            &[Enable::Property("subgroup_supported_operations", |p| {
+            &[Enable::Property("subgroupSupportedOperations", |p| {
                 p.subgroup_supported_operations
                     .contains(vk::SubgroupFeatureFlags::SHUFFLE_RELATIVE)
             })]
         }
         Capability::GroupNonUniformClustered => {
-            &[Enable::Property("subgroup_supported_operations", |p| {
+            &[Enable::Property("subgroupSupportedOperations", |p| {
                 p.subgroup_supported_operations
                     .contains(vk::SubgroupFeatureFlags::CLUSTERED)
             })]
         }
         Capability::GroupNonUniformQuad => {
-            &[Enable::Property("subgroup_supported_operations", |p| {
+            &[Enable::Property("subgroupSupportedOperations", |p| {
                 p.subgroup_supported_operations
                     .contains(vk::SubgroupFeatureFlags::QUAD)
             })]
@@ -262,256 +257,244 @@ pub(crate) fn enables(capability: Capability) -> &'static [Enable] {
             Enable::Absent("subgroupSupportedOperations"),
         ],
         Capability::SampleMaskPostDepthCoverage => &[Enable::Absent("VK_EXT_post_depth_coverage")],
-        Capability::RuntimeDescriptorArray => &[Enable::Feature("runtime_descriptor_array", |f| {
+        Capability::RuntimeDescriptorArray => &[Enable::Feature("runtimeDescriptorArray", |f| {
             f.runtime_descriptor_array
         })],
         Capability::InputAttachmentArrayDynamicIndexing => &[Enable::Feature(
-            "shader_input_attachment_array_dynamic_indexing",
+            "shaderInputAttachmentArrayDynamicIndexing",
             |f| f.shader_input_attachment_array_dynamic_indexing,
         )],
         Capability::UniformTexelBufferArrayDynamicIndexing => &[Enable::Feature(
-            "shader_uniform_texel_buffer_array_dynamic_indexing",
+            "shaderUniformTexelBufferArrayDynamicIndexing",
             |f| f.shader_uniform_texel_buffer_array_dynamic_indexing,
         )],
         Capability::StorageTexelBufferArrayDynamicIndexing => &[Enable::Feature(
-            "shader_storage_texel_buffer_array_dynamic_indexing",
+            "shaderStorageTexelBufferArrayDynamicIndexing",
             |f| f.shader_storage_texel_buffer_array_dynamic_indexing,
         )],
         Capability::UniformBufferArrayNonUniformIndexing => &[Enable::Feature(
-            "shader_uniform_buffer_array_non_uniform_indexing",
+            "shaderUniformBufferArrayNonUniformIndexing",
             |f| f.shader_uniform_buffer_array_non_uniform_indexing,
         )],
         Capability::SampledImageArrayNonUniformIndexing => &[Enable::Feature(
-            "shader_sampled_image_array_non_uniform_indexing",
+            "shaderSampledImageArrayNonUniformIndexing",
             |f| f.shader_sampled_image_array_non_uniform_indexing,
         )],
         Capability::StorageBufferArrayNonUniformIndexing => &[Enable::Feature(
-            "shader_storage_buffer_array_non_uniform_indexing",
+            "shaderStorageBufferArrayNonUniformIndexing",
             |f| f.shader_storage_buffer_array_non_uniform_indexing,
         )],
         Capability::StorageImageArrayNonUniformIndexing => &[Enable::Feature(
-            "shader_storage_image_array_non_uniform_indexing",
+            "shaderStorageImageArrayNonUniformIndexing",
             |f| f.shader_storage_image_array_non_uniform_indexing,
         )],
         Capability::InputAttachmentArrayNonUniformIndexing => &[Enable::Feature(
-            "shader_input_attachment_array_non_uniform_indexing",
+            "shaderInputAttachmentArrayNonUniformIndexing",
             |f| f.shader_input_attachment_array_non_uniform_indexing,
         )],
         Capability::UniformTexelBufferArrayNonUniformIndexing => &[Enable::Feature(
-            "shader_uniform_texel_buffer_array_non_uniform_indexing",
+            "shaderUniformTexelBufferArrayNonUniformIndexing",
             |f| f.shader_uniform_texel_buffer_array_non_uniform_indexing,
         )],
         Capability::StorageTexelBufferArrayNonUniformIndexing => &[Enable::Feature(
-            "shader_storage_texel_buffer_array_non_uniform_indexing",
+            "shaderStorageTexelBufferArrayNonUniformIndexing",
             |f| f.shader_storage_texel_buffer_array_non_uniform_indexing,
         )],
         Capability::FragmentFullyCoveredEXT => {
             &[Enable::Absent("VK_EXT_conservative_rasterization")]
         }
         Capability::Float16 => &[
-            Enable::Feature("shader_float16", |f| f.shader_float16),
+            Enable::Feature("shaderFloat16", |f| f.shader_float16),
             Enable::Absent("VK_AMD_gpu_shader_half_float"),
         ],
-        Capability::Int8 => &[Enable::Feature("shader_int8", |f| f.shader_int8)],
-        Capability::StorageBuffer8BitAccess => {
-            &[Enable::Feature("storage_buffer8_bit_access", |f| {
-                f.storage_buffer8_bit_access
+        Capability::Int8 => &[Enable::Feature("shaderInt8", |f| f.shader_int8)],
+        Capability::StorageBuffer8BitAccess => &[Enable::Feature("storageBuffer8BitAccess", |f| {
+            f.storage_buffer8_bit_access
+        })],
+        Capability::UniformAndStorageBuffer8BitAccess => {
+            &[Enable::Feature("uniformAndStorageBuffer8BitAccess", |f| {
+                f.uniform_and_storage_buffer8_bit_access
             })]
         }
-        Capability::UniformAndStorageBuffer8BitAccess => &[Enable::Feature(
-            "uniform_and_storage_buffer8_bit_access",
-            |f| f.uniform_and_storage_buffer8_bit_access,
-        )],
-        Capability::StoragePushConstant8 => &[Enable::Feature("storage_push_constant8", |f| {
+        Capability::StoragePushConstant8 => &[Enable::Feature("storagePushConstant8", |f| {
             f.storage_push_constant8
         })],
-        Capability::VulkanMemoryModel => &[Enable::Feature("vulkan_memory_model", |f| {
+        Capability::VulkanMemoryModel => &[Enable::Feature("vulkanMemoryModel", |f| {
             f.vulkan_memory_model
         })],
         Capability::VulkanMemoryModelDeviceScope => {
-            &[Enable::Feature("vulkan_memory_model_device_scope", |f| {
+            &[Enable::Feature("vulkanMemoryModelDeviceScope", |f| {
                 f.vulkan_memory_model_device_scope
             })]
         }
         Capability::DenormPreserve => &[
-            Enable::Property("shader_denorm_preserve_float16", |p| {
+            Enable::Property("shaderDenormPreserveFloat16", |p| {
                 p.shader_denorm_preserve_float16
             }),
-            Enable::Property("shader_denorm_preserve_float32", |p| {
+            Enable::Property("shaderDenormPreserveFloat32", |p| {
                 p.shader_denorm_preserve_float32
             }),
-            Enable::Property("shader_denorm_preserve_float64", |p| {
+            Enable::Property("shaderDenormPreserveFloat64", |p| {
                 p.shader_denorm_preserve_float64
             }),
         ],
         Capability::DenormFlushToZero => &[
-            Enable::Property("shader_denorm_flush_to_zero_float16", |p| {
+            Enable::Property("shaderDenormFlushToZeroFloat16", |p| {
                 p.shader_denorm_flush_to_zero_float16
             }),
-            Enable::Property("shader_denorm_flush_to_zero_float32", |p| {
+            Enable::Property("shaderDenormFlushToZeroFloat32", |p| {
                 p.shader_denorm_flush_to_zero_float32
             }),
-            Enable::Property("shader_denorm_flush_to_zero_float64", |p| {
+            Enable::Property("shaderDenormFlushToZeroFloat64", |p| {
                 p.shader_denorm_flush_to_zero_float64
             }),
         ],
         Capability::SignedZeroInfNanPreserve => &[
-            Enable::Property("shader_signed_zero_inf_nan_preserve_float16", |p| {
+            Enable::Property("shaderSignedZeroInfNanPreserveFloat16", |p| {
                 p.shader_signed_zero_inf_nan_preserve_float16
             }),
-            Enable::Property("shader_signed_zero_inf_nan_preserve_float32", |p| {
+            Enable::Property("shaderSignedZeroInfNanPreserveFloat32", |p| {
                 p.shader_signed_zero_inf_nan_preserve_float32
             }),
-            Enable::Property("shader_signed_zero_inf_nan_preserve_float64", |p| {
+            Enable::Property("shaderSignedZeroInfNanPreserveFloat64", |p| {
                 p.shader_signed_zero_inf_nan_preserve_float64
             }),
         ],
         Capability::RoundingModeRTE => &[
-            Enable::Property("shader_rounding_mode_rte_float16", |p| {
+            Enable::Property("shaderRoundingModeRTEFloat16", |p| {
                 p.shader_rounding_mode_rte_float16
             }),
-            Enable::Property("shader_rounding_mode_rte_float32", |p| {
+            Enable::Property("shaderRoundingModeRTEFloat32", |p| {
                 p.shader_rounding_mode_rte_float32
             }),
-            Enable::Property("shader_rounding_mode_rte_float64", |p| {
+            Enable::Property("shaderRoundingModeRTEFloat64", |p| {
                 p.shader_rounding_mode_rte_float64
             }),
         ],
         Capability::RoundingModeRTZ => &[
-            Enable::Property("shader_rounding_mode_rtz_float16", |p| {
+            Enable::Property("shaderRoundingModeRTZFloat16", |p| {
                 p.shader_rounding_mode_rtz_float16
             }),
-            Enable::Property("shader_rounding_mode_rtz_float32", |p| {
+            Enable::Property("shaderRoundingModeRTZFloat32", |p| {
                 p.shader_rounding_mode_rtz_float32
             }),
-            Enable::Property("shader_rounding_mode_rtz_float64", |p| {
+            Enable::Property("shaderRoundingModeRTZFloat64", |p| {
                 p.shader_rounding_mode_rtz_float64
             }),
         ],
         Capability::ComputeDerivativeGroupQuadsKHR => {
-            &[Enable::Absent("compute_derivative_group_quads")]
+            &[Enable::Absent("computeDerivativeGroupQuads")]
         }
         Capability::ComputeDerivativeGroupLinearKHR => {
-            &[Enable::Absent("compute_derivative_group_linear")]
+            &[Enable::Absent("computeDerivativeGroupLinear")]
         }
-        Capability::ImageFootprintNV => &[Enable::Absent("image_footprint")],
+        Capability::ImageFootprintNV => &[Enable::Absent("imageFootprint")],
         Capability::MeshShadingNV => &[Enable::Absent("VK_NV_mesh_shader")],
-        Capability::RayTracingKHR => &[Enable::Absent("ray_tracing_pipeline")],
-        Capability::RayQueryKHR => &[Enable::Absent("ray_query")],
+        Capability::RayTracingKHR => &[Enable::Absent("rayTracingPipeline")],
+        Capability::RayQueryKHR => &[Enable::Absent("rayQuery")],
         Capability::RayTraversalPrimitiveCullingKHR => &[
-            Enable::Absent("ray_traversal_primitive_culling"),
-            Enable::Absent("ray_query"),
+            Enable::Absent("rayTraversalPrimitiveCulling"),
+            Enable::Absent("rayQuery"),
         ],
-        Capability::RayCullMaskKHR => &[Enable::Absent("ray_tracing_maintenance1")],
+        Capability::RayCullMaskKHR => &[Enable::Absent("rayTracingMaintenance1")],
         Capability::RayTracingNV => &[Enable::Absent("VK_NV_ray_tracing")],
-        Capability::RayTracingMotionBlurNV => &[Enable::Absent("ray_tracing_motion_blur")],
-        Capability::TransformFeedback => &[Enable::Absent("transform_feedback")],
-        Capability::GeometryStreams => &[Enable::Absent("geometry_streams")],
+        Capability::RayTracingMotionBlurNV => &[Enable::Absent("rayTracingMotionBlur")],
+        Capability::TransformFeedback => &[Enable::Absent("transformFeedback")],
+        Capability::GeometryStreams => &[Enable::Absent("geometryStreams")],
         Capability::FragmentDensityEXT => &[
-            Enable::Absent("fragment_density_map"),
-            Enable::Absent("shading_rate_image"),
+            Enable::Absent("fragmentDensityMap"),
+            Enable::Absent("shadingRateImage"),
         ],
         Capability::PhysicalStorageBufferAddresses => &[
-            Enable::Feature("buffer_device_address", |f| f.buffer_device_address),
-            Enable::Absent("buffer_device_address"),
+            Enable::Feature("bufferDeviceAddress", |f| f.buffer_device_address),
+            Enable::Absent("bufferDeviceAddress"),
         ],
-        Capability::CooperativeMatrixNV => &[Enable::Absent("cooperative_matrix")],
-        Capability::IntegerFunctions2INTEL => &[Enable::Absent("shader_integer_functions2")],
-        Capability::ShaderSMBuiltinsNV => &[Enable::Absent("shader_sm_builtins")],
+        Capability::CooperativeMatrixNV => &[Enable::Absent("cooperativeMatrix")],
+        Capability::IntegerFunctions2INTEL => &[Enable::Absent("shaderIntegerFunctions2")],
+        Capability::ShaderSMBuiltinsNV => &[Enable::Absent("shaderSMBuiltins")],
         Capability::FragmentShaderSampleInterlockEXT => {
-            &[Enable::Absent("fragment_shader_sample_interlock")]
+            &[Enable::Absent("fragmentShaderSampleInterlock")]
         }
         Capability::FragmentShaderPixelInterlockEXT => {
-            &[Enable::Absent("fragment_shader_pixel_interlock")]
+            &[Enable::Absent("fragmentShaderPixelInterlock")]
         }
         Capability::FragmentShaderShadingRateInterlockEXT => &[
-            Enable::Absent("fragment_shader_shading_rate_interlock"),
-            Enable::Absent("shading_rate_image"),
+            Enable::Absent("fragmentShaderShadingRateInterlock"),
+            Enable::Absent("shadingRateImage"),
         ],
         Capability::DemoteToHelperInvocation => {
-            &[Enable::Feature("shader_demote_to_helper_invocation", |f| {
+            &[Enable::Feature("shaderDemoteToHelperInvocation", |f| {
                 f.shader_demote_to_helper_invocation
             })]
         }
         Capability::FragmentShadingRateKHR => &[
-            Enable::Absent("pipeline_fragment_shading_rate"),
-            Enable::Absent("primitive_fragment_shading_rate"),
-            Enable::Absent("attachment_fragment_shading_rate"),
+            Enable::Absent("pipelineFragmentShadingRate"),
+            Enable::Absent("primitiveFragmentShadingRate"),
+            Enable::Absent("attachmentFragmentShadingRate"),
         ],
         Capability::WorkgroupMemoryExplicitLayoutKHR => {
-            &[Enable::Feature("workgroup_memory_explicit_layout", |f| {
+            &[Enable::Feature("workgroupMemoryExplicitLayout", |f| {
                 f.workgroup_memory_explicit_layout
             })]
         }
         Capability::WorkgroupMemoryExplicitLayout8BitAccessKHR => &[Enable::Feature(
-            "workgroup_memory_explicit_layout8_bit_access",
+            "workgroupMemoryExplicitLayout8BitAccess",
             |f| f.workgroup_memory_explicit_layout8_bit_access,
         )],
         Capability::WorkgroupMemoryExplicitLayout16BitAccessKHR => &[Enable::Feature(
-            "workgroup_memory_explicit_layout16_bit_access",
+            "workgroupMemoryExplicitLayout16BitAccess",
             |f| f.workgroup_memory_explicit_layout16_bit_access,
         )],
-        Capability::DotProductInputAll => &[Enable::Feature("shader_integer_dot_product", |f| {
+        Capability::DotProductInputAll => &[Enable::Feature("shaderIntegerDotProduct", |f| {
             f.shader_integer_dot_product
         })],
-        Capability::DotProductInput4x8Bit => {
-            &[Enable::Feature("shader_integer_dot_product", |f| {
-                f.shader_integer_dot_product
-            })]
-        }
+        Capability::DotProductInput4x8Bit => &[Enable::Feature("shaderIntegerDotProduct", |f| {
+            f.shader_integer_dot_product
+        })],
         Capability::DotProductInput4x8BitPacked => {
-            &[Enable::Feature("shader_integer_dot_product", |f| {
+            &[Enable::Feature("shaderIntegerDotProduct", |f| {
                 f.shader_integer_dot_product
             })]
         }
-        Capability::DotProduct => &[Enable::Feature("shader_integer_dot_product", |f| {
+        Capability::DotProduct => &[Enable::Feature("shaderIntegerDotProduct", |f| {
             f.shader_integer_dot_product
         })],
-        Capability::FragmentBarycentricKHR => &[Enable::Absent("fragment_shader_barycentric")],
-        Capability::TextureSampleWeightedQCOM => &[Enable::Absent("texture_sample_weighted")],
-        Capability::TextureBoxFilterQCOM => &[Enable::Absent("texture_box_filter")],
-        Capability::TextureBlockMatchQCOM => &[Enable::Absent("texture_block_match")],
-        Capability::TextureBlockMatch2QCOM => &[Enable::Absent("texture_block_match2")],
+        Capability::FragmentBarycentricKHR => &[Enable::Absent("fragmentShaderBarycentric")],
+        Capability::TextureSampleWeightedQCOM => &[Enable::Absent("textureSampleWeighted")],
+        Capability::TextureBoxFilterQCOM => &[Enable::Absent("textureBoxFilter")],
+        Capability::TextureBlockMatchQCOM => &[Enable::Absent("textureBlockMatch")],
+        Capability::TextureBlockMatch2QCOM => &[Enable::Absent("textureBlockMatch2")],
         Capability::MeshShadingEXT => &[Enable::Absent("VK_EXT_mesh_shader")],
-        Capability::CoreBuiltinsARM => &[Enable::Absent("shader_core_builtins")],
+        Capability::CoreBuiltinsARM => &[Enable::Absent("shaderCoreBuiltins")],
         Capability::ShaderInvocationReorderNV => {
             &[Enable::Absent("VK_NV_ray_tracing_invocation_reorder")]
         }
-        Capability::RayTracingPositionFetchKHR => &[Enable::Absent("ray_tracing_position_fetch")],
-        Capability::RayQueryPositionFetchKHR => &[Enable::Absent("ray_tracing_position_fetch")],
+        Capability::RayTracingPositionFetchKHR => &[Enable::Absent("rayTracingPositionFetch")],
+        Capability::RayQueryPositionFetchKHR => &[Enable::Absent("rayTracingPositionFetch")],
         Capability::TileImageColorReadAccessEXT => {
-            &[Enable::Absent("shader_tile_image_color_read_access")]
+            &[Enable::Absent("shaderTileImageColorReadAccess")]
         }
         Capability::TileImageDepthReadAccessEXT => {
-            &[Enable::Absent("shader_tile_image_depth_read_access")]
+            &[Enable::Absent("shaderTileImageDepthReadAccess")]
         }
         Capability::TileImageStencilReadAccessEXT => {
-            &[Enable::Absent("shader_tile_image_stencil_read_access")]
+            &[Enable::Absent("shaderTileImageStencilReadAccess")]
         }
-        Capability::CooperativeMatrixKHR => &[Enable::Absent("cooperative_matrix")],
+        Capability::CooperativeMatrixKHR => &[Enable::Absent("cooperativeMatrix")],
         Capability::CooperativeMatrixConversionQCOM => {
             &[Enable::Absent("cooperativeMatrixConversion")]
         }
         Capability::ShaderEnqueueAMDX => &[Enable::Absent("shaderEnqueue")],
-        Capability::GroupNonUniformRotateKHR => &[
-            Enable::Absent("shaderSubgroupRotate"),
-            Enable::Absent("shader_subgroup_rotate"),
-        ],
-        Capability::ExpectAssumeKHR => &[
-            Enable::Absent("shaderExpectAssume"),
-            Enable::Absent("shader_expect_assume"),
-        ],
-        Capability::FloatControls2 => &[
-            Enable::Absent("shaderFloatControls2"),
-            Enable::Absent("shader_float_controls2"),
-        ],
-        Capability::QuadControlKHR => &[Enable::Absent("shader_quad_control")],
+        Capability::GroupNonUniformRotateKHR => &[Enable::Absent("shaderSubgroupRotate")],
+        Capability::ExpectAssumeKHR => &[Enable::Absent("shaderExpectAssume")],
+        Capability::FloatControls2 => &[Enable::Absent("shaderFloatControls2")],
+        Capability::QuadControlKHR => &[Enable::Absent("shaderQuadControl")],
         Capability::BFloat16TypeKHR => &[Enable::Absent("shaderBFloat16Type")],
         Capability::BFloat16DotProductKHR => &[Enable::Absent("shaderBFloat16DotProduct")],
         Capability::BFloat16CooperativeMatrixKHR => {
             &[Enable::Absent("shaderBFloat16CooperativeMatrix")]
         }
-        Capability::RawAccessChainsNV => &[Enable::Absent("shader_raw_access_chains")],
+        Capability::RawAccessChainsNV => &[Enable::Absent("shaderRawAccessChains")],
         Capability::ReplicatedCompositesEXT => &[Enable::Absent("shaderReplicatedComposites")],
         Capability::TensorAddressingNV => &[Enable::Absent("cooperativeMatrixTensorAddressing")],
         Capability::CooperativeMatrixConversionsNV => {

@@ -84,8 +84,7 @@ struct Image {
 // SAFETY of all `unsafe` here: handles are used while they are valid, structures are valid, commands are in order, and
 // the host touches memory only while the device is idle.
 impl Gpu {
-    pub fn new() -> Outcome<Self> {
-        let entry = vulkan_gaurast::entry();
+    pub fn new(entry: &ash::Entry) -> Outcome<Self> {
         let app = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
         let info = vk::InstanceCreateInfo::default().application_info(&app);
         let queues = [vk::DeviceQueueCreateInfo::default().queue_priorities(&[1.0])];

@@ -34,12 +34,19 @@ fn picture(gpu: &Gpu, content: &Content<'_>) -> Result<RgbImage, Box<dyn Error>>
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let folder = std::env::args().nth(1).unwrap_or("samples".to_owned());
-    let folder = Path::new(&folder);
+    let (options, folders): (Vec<_>, Vec<_>) =
+        (std::env::args().skip(1)).partition(|argument| argument == "--loader");
+    let folder = Path::new(folders.first().map_or("samples", String::as_str));
+    let entry = if options.is_empty() {
+        vulkan_gaurast::entry()
+    } else {
+        // SAFETY: the system's loader is sound.
+        unsafe { ash::Entry::load()? }
+    };
     let pictures = folder.join("pictures/gallery");
     std::fs::create_dir_all(&pictures)?;
     let scenes = scenes::Scenes::new();
-    let gpu = Gpu::new()?;
+    let gpu = Gpu::new(&entry)?;
     let mut page = "# Gallery\n\nA picture of each mode. `cargo run --release -p gaurast-examples --example gallery` draws them and writes this page.\n".to_owned();
     for room in rooms::all(&scenes) {
         let (mut images, mut captions) = (String::new(), String::new());

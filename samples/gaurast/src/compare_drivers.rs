@@ -63,6 +63,10 @@ pub enum Error {
         driver: String,
         status: ExitStatus,
     },
+    #[error(
+        "{program}: it wrote no picture; see compare-drivers --help for their places and kinds"
+    )]
+    NoPicture { program: String },
     #[error(transparent)]
     Compare(#[from] compare::Error),
     #[error(transparent)]
@@ -180,7 +184,7 @@ pub fn run(arguments: &CompareDriversArguments) -> Result<(), Error> {
     let differences = arguments.out.join("differences");
     let shown = arguments.out.join("shown");
     let mut compared = Vec::new();
-    for (name, a, b) in compare::pairs(&drivers[0].folder, &drivers[1].folder)? {
+    for (name, a, b) in pairs(&drivers, &arguments.command)? {
         let pictures = [gaurast_picture::read(&a)?, gaurast_picture::read(&b)?];
         compare::check_sizes(&pictures[0], &a, &pictures[1], &b)?;
         let (one, difference) = compare_pictures(&name, &pictures);
@@ -209,6 +213,21 @@ pub fn run(arguments: &CompareDriversArguments) -> Result<(), Error> {
         });
     }
     Ok(())
+}
+
+/// The names of the program's pictures, with their paths on both drivers.
+fn pairs(
+    drivers: &[Driver; 2],
+    command: &[OsString],
+) -> Result<Vec<(String, PathBuf, PathBuf)>, Error> {
+    compare::pairs(&drivers[0].folder, &drivers[1].folder).map_err(|error| match error {
+        compare::Error::NoPicture { .. } => Error::NoPicture {
+            program: command
+                .first()
+                .map_or_else(String::new, |it| it.to_string_lossy().into()),
+        },
+        other => other.into(),
+    })
 }
 
 /// Creates the folder. It must be empty, unless `--force` is given.
@@ -442,7 +461,11 @@ fn page_of(drivers: &[Driver; 2], compared: &[Compared]) -> String {
         figure(format!("shown/{name}-{theirs}.png"), &theirs);
         figure(
             format!("differences/{name}.png"),
-            "difference, the largest being white",
+            if one.equal {
+                "no difference"
+            } else {
+                "difference, the largest being white"
+            },
         );
     }
     page.push_str("</body></html>\n");

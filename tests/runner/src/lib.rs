@@ -48,7 +48,7 @@ pub use case::{Case, Shard, Variant, shards, simd_levels};
 pub use gaurast_runner_macros::test;
 #[doc(hidden)]
 pub use inventory;
-pub use library::built_library;
+pub use library::{built_example, built_library};
 use need::Ignored;
 pub use need::{
     Missing, Need, SIMD_LEVELS, data, data_folder, has_simd_level, ignore, is_long,

@@ -15,6 +15,20 @@ const LIBRARIES: &str = "GAURAST_TEST_LIBRARIES";
 /// # Panics
 /// If the build fails; the message has its output.
 pub fn built_library(package: &str, file: &str) -> PathBuf {
+    built(package, &[], Path::new(file))
+}
+
+/// The path of a package's example, likewise.
+///
+/// # Panics
+/// As [`built_library`].
+pub fn built_example(package: &str, name: &str) -> PathBuf {
+    let file = Path::new("examples").join(name);
+    built(package, &["--example", name], &file)
+}
+
+/// The path of a `file` in the profile's folder, which is what cargo makes of `targets` of a package.
+fn built(package: &str, targets: &[&str], file: &Path) -> PathBuf {
     static ONE_BUILD: Mutex<()> = Mutex::new(());
     if let Some(built) = std::env::var_os(LIBRARIES) {
         let library = Path::new(&built).join(file);
@@ -48,6 +62,7 @@ pub fn built_library(package: &str, file: &str) -> PathBuf {
             "--profile",
             profile,
         ])
+        .args(targets)
         .arg("--target-dir")
         .arg(folder.parent().expect("the target folder"))
         .current_dir(env!("CARGO_MANIFEST_DIR"))

@@ -46,22 +46,24 @@ pub fn lines(triangle: &[Position; 3]) -> [Line; 5] {
     [edges[0], edges[1], edges[2], near, far]
 }
 
-/// True if a triangle with w = 1 covers the sample at `x` and `y`, in sixteenths of a pixel, of a square of `size`
-/// pixels: it is inside, or on a left or top edge.
+/// True if a triangle covers the sample at `x` and `y`, in sixteenths of a pixel, of a square of `size` pixels: its point there is
+/// in front of the eye and within the near and the far plane, and inside, or on a left or top edge.
 pub fn covers(triangle: &[Position; 3], size: u32, [x, y]: [u32; 2]) -> bool {
     let points = triangle.map(|[x, y, _, w]| [x, y, w].map(i128::from));
-    let [a, b, c, ..] = lines(triangle);
+    let [a, b, c, near, far] = lines(triangle);
     let turn = dot(points[0], a).signum();
     let denominator = 16 * i128::from(size);
     let along = |sixteenths: u32| 2 * i128::from(sixteenths) - denominator;
     let sample = [along(x), along(y), denominator];
-    turn != 0
-        && [a, b, c].iter().all(|&line| {
-            // The value grows towards the inside; y points down.
-            let line = line.map(|part| turn * part);
-            let inside = dot(line, sample);
-            inside > 0 || inside == 0 && (line[0] > 0 || line[0] == 0 && line[1] > 0)
-        })
+    // The values of the edges, over the determinant, are the weights of the corners in the sample's point, whose w is 1.
+    let is_inside = |line: Line| {
+        // The value grows towards the inside; y points down.
+        let line = line.map(|part| turn * part);
+        let inside = dot(line, sample);
+        inside > 0 || inside == 0 && (line[0] > 0 || line[0] == 0 && line[1] > 0)
+    };
+    let depth = |plane: Line| turn * dot(plane, sample);
+    turn != 0 && [a, b, c].into_iter().all(is_inside) && depth(near) >= 0 && depth(far) <= 0
 }
 
 /// True if the sample at `x` and `y`, in sixteenths of a pixel, of a square of `size` pixels is within 1/256 of a pixel
@@ -114,6 +116,25 @@ mod tests {
                 assert_eq!(count(x, y), usize::from(inside), "{x} {y}");
             }
         }
+    }
+
+    #[test]
+    fn what_is_behind_the_eye_or_a_plane_is_not_covered() {
+        // A floor: y = w / 2 at w = 2, and its third corner behind the eye. The near plane is at w = 1.
+        let at = |x: i64, w: i64| [x, UNITS, w - UNITS, w];
+        let floor = [at(-100, 2 * UNITS), at(100, 2 * UNITS), at(0, -UNITS)];
+        let at_row = |row: u32| covers(&floor, 64, [512, 16 * row + 8]);
+        // y / w is 1/2 at the far edge, which is row 48, and 1 at the near plane, where the picture ends; above the far edge is
+        // the mirror image of what is behind the eye.
+        let covered: Vec<u32> = (0..64).filter(|&row| at_row(row)).collect();
+        assert_eq!(covered, (48..64).collect::<Vec<_>>());
+        // Depth goes from -1/2 at the left to 3/2 at the right.
+        let at = |x: i64, y: i64, z: i64| [x, y, z, UNITS];
+        let cut = [at(-64, -64, -32), at(64, -64, 96), at(-64, 64, -32)];
+        let row: Vec<u32> = (0..64)
+            .filter(|&x| covers(&cut, 64, [16 * x + 8, 8]))
+            .collect();
+        assert_eq!(row, (16..48).collect::<Vec<_>>());
     }
 
     #[test]

@@ -4,6 +4,7 @@
 //! drew. The code is an ordinary Vulkan application; [`gaurast_testkit`] explains the safety of its `unsafe`.
 
 pub mod checksum;
+pub mod clipped;
 pub mod edges;
 mod expected;
 pub mod models;

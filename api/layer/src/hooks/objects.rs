@@ -47,9 +47,10 @@ destroys! {
     destroy_command_pool(pool: vk::CommandPool) |state| state.recordings.retain(|_, recording| recording.pool != pool);
 }
 
-/// Hooks that look at what was created.
+/// Hooks that look at what was created, and at the device if it is named.
 macro_rules! creates {
-    ($($name:ident($info:ident: $info_type:ty, $object:ident: $type:ty) |$own:ident, $state:ident| $look:block)*) => {$(
+    ($($name:ident($info:ident: $info_type:ty, $object:ident: $type:ty) $(with $own:ident)?
+        |$state:ident| $look:block)*) => {$(
         pub(super) unsafe extern "system" fn $name(
             device: vk::Device,
             info: *const $info_type,
@@ -58,12 +59,13 @@ macro_rules! creates {
         ) -> vk::Result {
             // SAFETY: see the module above.
             unsafe {
-                let Some($own) = Device::of(device) else { return FAILED };
-                let Some(next) = $own.next.$name else { return FAILED };
+                let Some(above) = Device::of(device) else { return FAILED };
+                $(let $own = &above;)?
+                let Some(next) = above.next.$name else { return FAILED };
                 let result = next(device, info, allocator, object);
                 if result == vk::Result::SUCCESS {
                     let ($info, $object) = (&*info, *object);
-                    $own.observe(|$state, _| $look);
+                    above.observe(|$state, _| $look);
                 }
                 result
             }
@@ -71,7 +73,7 @@ macro_rules! creates {
     )*};
 }
 creates! {
-    allocate_memory(info: vk::MemoryAllocateInfo<'_>, memory: vk::DeviceMemory) |own, state| {
+    allocate_memory(info: vk::MemoryAllocateInfo<'_>, memory: vk::DeviceMemory) with own |state| {
         let known = Memory {
             size: info.allocation_size,
             is_mappable: own.facts.mappable & 1 << info.memory_type_index != 0,
@@ -79,8 +81,7 @@ creates! {
         };
         state.objects.memories.insert(memory, known);
     }
-    create_buffer(info: vk::BufferCreateInfo<'_>, buffer: vk::Buffer) |own, state| {
-        let _ = &own;
+    create_buffer(info: vk::BufferCreateInfo<'_>, buffer: vk::Buffer) |state| {
         let storage = vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::STORAGE_TEXEL_BUFFER;
         let known = Buffer {
             serial: state.objects.next_serial(),
@@ -93,15 +94,13 @@ creates! {
         };
         state.objects.buffers.insert(buffer, known);
     }
-    create_shader_module(info: vk::ShaderModuleCreateInfo<'_>, module: vk::ShaderModule) |own, state| {
-        let _ = &own;
+    create_shader_module(info: vk::ShaderModuleCreateInfo<'_>, module: vk::ShaderModule) |state| {
         let count = u32::try_from(info.code_size / 4).unwrap_or(0);
         let words = slice(info.p_code, count).to_vec();
         state.objects.modules.insert(module, Arc::new(words));
     }
     create_descriptor_set_layout(info: vk::DescriptorSetLayoutCreateInfo<'_>, layout: vk::DescriptorSetLayout)
-        |own, state| {
-        let _ = &own;
+        |state| {
         let bindings = slice(info.p_bindings, info.binding_count).iter();
         let mut known: Vec<_> = bindings
             .map(|binding| LayoutBinding {
@@ -114,14 +113,12 @@ creates! {
         known.sort_by_key(|binding| binding.binding);
         state.objects.set_layouts.insert(layout, Arc::new(known));
     }
-    create_pipeline_layout(info: vk::PipelineLayoutCreateInfo<'_>, layout: vk::PipelineLayout) |own, state| {
-        let _ = &own;
+    create_pipeline_layout(info: vk::PipelineLayoutCreateInfo<'_>, layout: vk::PipelineLayout) |state| {
         let sets = slice(info.p_set_layouts, info.set_layout_count).iter();
         let known = sets.map(|set| state.objects.set_layouts.get(set).cloned()).collect();
         state.objects.layouts.insert(layout, Arc::new(known));
     }
-    create_render_pass(info: vk::RenderPassCreateInfo<'_>, pass: vk::RenderPass) |own, state| {
-        let _ = &own;
+    create_render_pass(info: vk::RenderPassCreateInfo<'_>, pass: vk::RenderPass) |state| {
         let attachments = slice(info.p_attachments, info.attachment_count);
         let attachments: Vec<_> = attachments.iter().map(|a| (a.format, a.load_op)).collect();
         let views = find::<vk::RenderPassMultiviewCreateInfo<'_>>(info.p_next);
@@ -138,8 +135,7 @@ creates! {
             .collect();
         state.objects.render_passes.insert(pass, Arc::new(known));
     }
-    create_render_pass2(info: vk::RenderPassCreateInfo2<'_>, pass: vk::RenderPass) |own, state| {
-        let _ = &own;
+    create_render_pass2(info: vk::RenderPassCreateInfo2<'_>, pass: vk::RenderPass) |state| {
         let attachments = slice(info.p_attachments, info.attachment_count);
         let attachments: Vec<_> = attachments.iter().map(|a| (a.format, a.load_op)).collect();
         let subpasses = slice(info.p_subpasses, info.subpass_count).iter().enumerate();
@@ -208,21 +204,11 @@ pub(super) unsafe extern "system" fn map_memory(
 ) -> vk::Result {
     // SAFETY: see the module above.
     unsafe {
-        let Some(own) = Device::of(device) else {
-            return FAILED;
-        };
-        let Some(next) = own.next.map_memory else {
-            return FAILED;
-        };
-        // Locked, since the layer may map the memory for a while.
-        let mut state = own.lock();
-        let result = next(device, memory, offset, size, flags, data);
-        if result == vk::Result::SUCCESS
-            && let Some(known) = state.objects.memories.get_mut(&memory)
-        {
-            known.map((*data) as usize, offset, size);
-        }
-        result
+        map(device, memory, [offset, size], data, |own| {
+            Some(own.next.map_memory?(
+                device, memory, offset, size, flags, data,
+            ))
+        })
     }
 }
 
@@ -233,36 +219,47 @@ pub(super) unsafe extern "system" fn map_memory2(
 ) -> vk::Result {
     // SAFETY: see the module above.
     unsafe {
-        let Some(own) = Device::of(device) else {
-            return FAILED;
-        };
-        let Some(next) = own.next.map_memory2 else {
-            return FAILED;
-        };
-        let mut state = own.lock();
-        let result = next(device, info, data);
-        if result == vk::Result::SUCCESS
-            && let Some(known) = state.objects.memories.get_mut(&(*info).memory)
-        {
-            known.map((*data) as usize, (*info).offset, (*info).size);
-        }
-        result
+        let range = [(*info).offset, (*info).size];
+        map(device, (*info).memory, range, data, |own| {
+            Some(own.next.map_memory2?(device, info, data))
+        })
     }
+}
+
+/// Maps memory by `next`, which writes to `data` where its `range`, an offset and a size, lies.
+///
+/// # Safety
+/// `data` is valid.
+unsafe fn map(
+    device: vk::Device,
+    memory: vk::DeviceMemory,
+    [offset, size]: [vk::DeviceSize; 2],
+    data: *const *mut c_void,
+    next: impl FnOnce(&Device) -> Option<vk::Result>,
+) -> vk::Result {
+    // SAFETY: see the module above.
+    let Some(own) = (unsafe { Device::of(device) }) else {
+        return FAILED;
+    };
+    // Locked, since the layer may map the memory for a while.
+    let mut state = own.lock();
+    let result = next(&own).unwrap_or(FAILED);
+    if result == vk::Result::SUCCESS
+        && let Some(known) = state.objects.memories.get_mut(&memory)
+    {
+        // SAFETY: the mapping has succeeded, so that the pointer is written.
+        known.map(unsafe { *data } as usize, offset, size);
+    }
+    result
 }
 
 pub(super) unsafe extern "system" fn unmap_memory(device: vk::Device, memory: vk::DeviceMemory) {
     // SAFETY: see the module above.
     unsafe {
-        let Some(own) = Device::of(device) else {
-            return;
-        };
-        let mut state = own.lock();
-        if let Some(known) = state.objects.memories.get_mut(&memory) {
-            known.mapped = None;
-        }
-        if let Some(next) = own.next.unmap_memory {
-            next(device, memory);
-        }
+        let _done = unmap(device, memory, |own| {
+            own.next.unmap_memory?(device, memory);
+            Some(vk::Result::SUCCESS)
+        });
     }
 }
 
@@ -272,18 +269,31 @@ pub(super) unsafe extern "system" fn unmap_memory2(
 ) -> vk::Result {
     // SAFETY: see the module above.
     unsafe {
-        let Some(own) = Device::of(device) else {
-            return FAILED;
-        };
-        let Some(next) = own.next.unmap_memory2 else {
-            return FAILED;
-        };
-        let mut state = own.lock();
-        if let Some(known) = state.objects.memories.get_mut(&(*info).memory) {
-            known.mapped = None;
-        }
-        next(device, info)
+        unmap(device, (*info).memory, |own| {
+            Some(own.next.unmap_memory2?(device, info))
+        })
     }
+}
+
+/// Unmaps memory by `next`.
+///
+/// # Safety
+/// `device` is valid.
+unsafe fn unmap(
+    device: vk::Device,
+    memory: vk::DeviceMemory,
+    next: impl FnOnce(&Device) -> Option<vk::Result>,
+) -> vk::Result {
+    // SAFETY: see the module above.
+    let Some(own) = (unsafe { Device::of(device) }) else {
+        return FAILED;
+    };
+    // Locked, so that the layer does not read memory that is going away.
+    let mut state = own.lock();
+    if let Some(known) = state.objects.memories.get_mut(&memory) {
+        known.mapped = None;
+    }
+    next(&own).unwrap_or(FAILED)
 }
 
 pub(super) unsafe extern "system" fn bind_buffer_memory(

@@ -120,19 +120,21 @@ pub(super) unsafe extern "system" fn end_command_buffer(commands: vk::CommandBuf
     }
 }
 
-/// Hooks of commands without a result: each looks at its parameters, and passes them on.
+/// Hooks of commands without a result: each looks at its parameters, and at the device if it is named, and passes them
+/// on.
 macro_rules! records {
-    ($($name:ident($($parameter:ident: $type:ty),*)
-        |$own:ident, $state:ident, $faults:ident| $look:block)*) => {$(
+    ($($name:ident($($parameter:ident: $type:ty),*) $(with $own:ident)?
+        |$state:ident, $faults:ident| $look:block)*) => {$(
         pub(super) unsafe extern "system" fn $name(commands: vk::CommandBuffer, $($parameter: $type),*) {
             // SAFETY: see the module above.
             unsafe {
-                let Some($own) = Device::of(commands) else { return };
-                $own.observe(|state, $faults| {
+                let Some(device) = Device::of(commands) else { return };
+                $(let $own = &device;)?
+                device.observe(|state, $faults| {
                     let $state = state.recording(commands);
                     $look
                 });
-                if let Some(next) = $own.next.$name {
+                if let Some(next) = device.next.$name {
                     next(commands, $($parameter),*);
                 }
             }
@@ -140,8 +142,7 @@ macro_rules! records {
     )*};
 }
 records! {
-    cmd_bind_pipeline(point: vk::PipelineBindPoint, pipeline: vk::Pipeline) |own, state, _faults| {
-        let _ = &own;
+    cmd_bind_pipeline(point: vk::PipelineBindPoint, pipeline: vk::Pipeline) |state, _faults| {
         let (recording, objects) = state;
         if point == vk::PipelineBindPoint::GRAPHICS {
             recording.pipeline = objects.pipelines.get(&pipeline).cloned();
@@ -149,8 +150,7 @@ records! {
     }
     cmd_bind_vertex_buffers(
         first: u32, count: u32, buffers: *const vk::Buffer, offsets: *const vk::DeviceSize
-    ) |own, state, _faults| {
-        let _ = &own;
+    ) |state, _faults| {
         let pairs = slice(buffers, count).iter().zip(slice(offsets, count));
         for (binding, (&buffer, &offset)) in (first..).zip(pairs) {
             let bound = VertexBuffer { buffer, offset, size: None, stride: None };
@@ -160,8 +160,7 @@ records! {
     cmd_bind_vertex_buffers2(
         first: u32, count: u32, buffers: *const vk::Buffer, offsets: *const vk::DeviceSize,
         sizes: *const vk::DeviceSize, strides: *const vk::DeviceSize
-    ) |own, state, _faults| {
-        let _ = &own;
+    ) |state, _faults| {
         let (sizes, strides) = (slice(sizes, count), slice(strides, count));
         let pairs = slice(buffers, count).iter().zip(slice(offsets, count)).enumerate();
         for (index, (&buffer, &offset)) in pairs {
@@ -171,15 +170,13 @@ records! {
             state.0.vertex_buffers.insert(first + index as u32, bound);
         }
     }
-    cmd_bind_index_buffer(buffer: vk::Buffer, offset: vk::DeviceSize, ty: vk::IndexType) |own, state, _faults| {
-        let _ = &own;
+    cmd_bind_index_buffer(buffer: vk::Buffer, offset: vk::DeviceSize, ty: vk::IndexType) |state, _faults| {
         state.0.index_buffer = Some(IndexBuffer { buffer, offset, ty });
     }
     cmd_bind_descriptor_sets(
         point: vk::PipelineBindPoint, layout: vk::PipelineLayout, first: u32, count: u32,
         sets: *const vk::DescriptorSet, offset_count: u32, offsets: *const u32
-    ) |own, state, _faults| {
-        let _ = &own;
+    ) |state, _faults| {
         let (recording, objects) = state;
         if point != vk::PipelineBindPoint::GRAPHICS {
             return;
@@ -200,8 +197,7 @@ records! {
     cmd_push_descriptor_set(
         point: vk::PipelineBindPoint, layout: vk::PipelineLayout, set: u32, count: u32,
         writes: *const vk::WriteDescriptorSet<'_>
-    ) |own, state, _faults| {
-        let _ = (&own, layout);
+    ) |state, _faults| {
         let (recording, objects) = state;
         for write in slice(writes, count) {
             for (binding, info) in written_buffers(write) {
@@ -217,100 +213,79 @@ records! {
             }
         }
     }
-    cmd_set_viewport(first: u32, count: u32, viewports: *const vk::Viewport) |own, state, _faults| {
-        let _ = &own;
+    cmd_set_viewport(first: u32, count: u32, viewports: *const vk::Viewport) |state, _faults| {
         let viewport = slice(viewports, count).first().filter(|_| first == 0);
         set_viewport(state.0, viewport, vk::DynamicState::VIEWPORT);
     }
-    cmd_set_viewport_with_count(count: u32, viewports: *const vk::Viewport) |own, state, _faults| {
-        let _ = &own;
+    cmd_set_viewport_with_count(count: u32, viewports: *const vk::Viewport) |state, _faults| {
         let viewport = slice(viewports, count).first();
         set_viewport(state.0, viewport, vk::DynamicState::VIEWPORT_WITH_COUNT);
     }
-    cmd_set_scissor(first: u32, count: u32, scissors: *const vk::Rect2D) |own, state, _faults| {
-        let _ = (&own, first);
+    cmd_set_scissor(first: u32, count: u32, scissors: *const vk::Rect2D) |state, _faults| {
         let scissors = format!("{:?}", slice(scissors, count));
         state.0.set_dynamic(vk::DynamicState::SCISSOR, scissors);
     }
-    cmd_set_scissor_with_count(count: u32, scissors: *const vk::Rect2D) |own, state, _faults| {
-        let _ = &own;
+    cmd_set_scissor_with_count(count: u32, scissors: *const vk::Rect2D) |state, _faults| {
         let scissors = format!("{:?}", slice(scissors, count));
         state.0.set_dynamic(vk::DynamicState::SCISSOR_WITH_COUNT, scissors);
     }
-    cmd_set_blend_constants(constants: *const [f32; 4]) |own, state, _faults| {
-        let _ = &own;
+    cmd_set_blend_constants(constants: *const [f32; 4]) |state, _faults| {
         let constants = format!("{:?}", *constants);
         state.0.set_dynamic(vk::DynamicState::BLEND_CONSTANTS, constants);
     }
-    cmd_set_depth_bounds(least: f32, greatest: f32) |own, state, _faults| {
-        let _ = &own;
+    cmd_set_depth_bounds(least: f32, greatest: f32) |state, _faults| {
         state.0.set_dynamic(vk::DynamicState::DEPTH_BOUNDS, format!("{least} {greatest}"));
     }
-    cmd_set_stencil_compare_mask(faces: vk::StencilFaceFlags, mask: u32) |own, state, _faults| {
-        let _ = &own;
+    cmd_set_stencil_compare_mask(faces: vk::StencilFaceFlags, mask: u32) |state, _faults| {
         set_front(state.0, faces, vk::DynamicState::STENCIL_COMPARE_MASK, mask);
     }
-    cmd_set_stencil_write_mask(faces: vk::StencilFaceFlags, mask: u32) |own, state, _faults| {
-        let _ = &own;
+    cmd_set_stencil_write_mask(faces: vk::StencilFaceFlags, mask: u32) |state, _faults| {
         set_front(state.0, faces, vk::DynamicState::STENCIL_WRITE_MASK, mask);
     }
-    cmd_set_stencil_reference(faces: vk::StencilFaceFlags, reference: u32) |own, state, _faults| {
-        let _ = &own;
+    cmd_set_stencil_reference(faces: vk::StencilFaceFlags, reference: u32) |state, _faults| {
         set_front(state.0, faces, vk::DynamicState::STENCIL_REFERENCE, reference);
     }
-    cmd_set_depth_test_enable(enable: vk::Bool32) |own, state, _faults| {
-        let _ = &own;
+    cmd_set_depth_test_enable(enable: vk::Bool32) |state, _faults| {
         state.0.set_dynamic(vk::DynamicState::DEPTH_TEST_ENABLE, enable.to_ne_bytes());
     }
-    cmd_set_depth_write_enable(enable: vk::Bool32) |own, state, _faults| {
-        let _ = &own;
+    cmd_set_depth_write_enable(enable: vk::Bool32) |state, _faults| {
         state.0.set_dynamic(vk::DynamicState::DEPTH_WRITE_ENABLE, enable.to_ne_bytes());
     }
-    cmd_set_depth_compare_op(op: vk::CompareOp) |own, state, _faults| {
-        let _ = &own;
+    cmd_set_depth_compare_op(op: vk::CompareOp) |state, _faults| {
         state.0.set_dynamic(vk::DynamicState::DEPTH_COMPARE_OP, op.as_raw().to_ne_bytes());
     }
-    cmd_set_depth_bounds_test_enable(enable: vk::Bool32) |own, state, _faults| {
-        let _ = &own;
+    cmd_set_depth_bounds_test_enable(enable: vk::Bool32) |state, _faults| {
         state.0.set_dynamic(vk::DynamicState::DEPTH_BOUNDS_TEST_ENABLE, enable.to_ne_bytes());
     }
-    cmd_set_stencil_test_enable(enable: vk::Bool32) |own, state, _faults| {
-        let _ = &own;
+    cmd_set_stencil_test_enable(enable: vk::Bool32) |state, _faults| {
         state.0.set_dynamic(vk::DynamicState::STENCIL_TEST_ENABLE, enable.to_ne_bytes());
     }
     cmd_begin_render_pass(begin: *const vk::RenderPassBeginInfo<'_>, contents: vk::SubpassContents)
-        |own, state, _faults| {
-        let _ = (&own, contents);
+        |state, _faults| {
         begin_render_pass(state, &*begin);
     }
     cmd_begin_render_pass2(
         begin: *const vk::RenderPassBeginInfo<'_>, subpass: *const vk::SubpassBeginInfo<'_>
-    ) |own, state, _faults| {
-        let _ = (&own, subpass);
+    ) |state, _faults| {
         begin_render_pass(state, &*begin);
     }
-    cmd_next_subpass(contents: vk::SubpassContents) |own, state, faults| {
-        let _ = (&own, contents);
+    cmd_next_subpass(contents: vk::SubpassContents) |state, faults| {
         rules::set::require_ended(state.0, "vkCmdNextSubpass", faults);
         state.0.next_subpass();
     }
-    cmd_next_subpass2(begin: *const vk::SubpassBeginInfo<'_>, end: *const vk::SubpassEndInfo<'_>) |own, state, faults| {
-        let _ = (&own, begin, end);
+    cmd_next_subpass2(begin: *const vk::SubpassBeginInfo<'_>, end: *const vk::SubpassEndInfo<'_>) |state, faults| {
         rules::set::require_ended(state.0, "vkCmdNextSubpass2", faults);
         state.0.next_subpass();
     }
-    cmd_end_render_pass() |own, state, faults| {
-        let _ = &own;
+    cmd_end_render_pass() |state, faults| {
         rules::set::require_ended(state.0, "vkCmdEndRenderPass", faults);
         state.0.pass = None;
     }
-    cmd_end_render_pass2(end: *const vk::SubpassEndInfo<'_>) |own, state, faults| {
-        let _ = (&own, end);
+    cmd_end_render_pass2(end: *const vk::SubpassEndInfo<'_>) |state, faults| {
         rules::set::require_ended(state.0, "vkCmdEndRenderPass2", faults);
         state.0.pass = None;
     }
-    cmd_begin_rendering(info: *const vk::RenderingInfo<'_>) |own, state, _faults| {
-        let _ = &own;
+    cmd_begin_rendering(info: *const vk::RenderingInfo<'_>) |state, _faults| {
         let info = &*info;
         let colors = slice(info.p_color_attachments, info.color_attachment_count).iter();
         let resumes = info.flags.contains(vk::RenderingFlags::RESUMING);
@@ -323,29 +298,27 @@ records! {
         };
         state.0.begin_pass(subpass, None);
     }
-    cmd_end_rendering() |own, state, faults| {
-        let _ = &own;
+    cmd_end_rendering() |state, faults| {
         rules::set::require_ended(state.0, "vkCmdEndRendering", faults);
         state.0.pass = None;
     }
-    cmd_draw(count: u32, instances: u32, first: u32, first_instance: u32) |own, state, faults| {
+    cmd_draw(count: u32, instances: u32, first: u32, first_instance: u32) with own |state, faults| {
         let call = Call::Vertices([first, count, first_instance, instances]);
         rules::draw::check(state.0, call, state.1, &own.facts, faults);
     }
-    cmd_draw_indexed(count: u32, instances: u32, first: u32, offset: i32, first_instance: u32) |own, state, faults| {
+    cmd_draw_indexed(count: u32, instances: u32, first: u32, offset: i32, first_instance: u32)
+        with own |state, faults| {
         let call = Call::Indices([first, count, first_instance, instances], offset);
         rules::draw::check(state.0, call, state.1, &own.facts, faults);
     }
-    cmd_draw_indirect(buffer: vk::Buffer, offset: vk::DeviceSize, count: u32, stride: u32) |own, state, faults| {
-        let _ = stride;
+    cmd_draw_indirect(buffer: vk::Buffer, offset: vk::DeviceSize, count: u32, stride: u32) with own |state, faults| {
         if count > 0 {
             let call = Call::Indirect(buffer, offset, false);
             rules::draw::check(state.0, call, state.1, &own.facts, faults);
         }
     }
     cmd_draw_indexed_indirect(buffer: vk::Buffer, offset: vk::DeviceSize, count: u32, stride: u32)
-        |own, state, faults| {
-        let _ = stride;
+        with own |state, faults| {
         if count > 0 {
             let call = Call::Indirect(buffer, offset, true);
             rules::draw::check(state.0, call, state.1, &own.facts, faults);
@@ -354,27 +327,23 @@ records! {
     cmd_draw_indirect_count(
         buffer: vk::Buffer, offset: vk::DeviceSize, counts: vk::Buffer, count_offset: vk::DeviceSize,
         most: u32, stride: u32
-    ) |own, state, faults| {
-        let _ = (counts, count_offset, most, stride);
+    ) with own |state, faults| {
         let call = Call::Indirect(buffer, offset, false);
         rules::draw::check(state.0, call, state.1, &own.facts, faults);
     }
     cmd_draw_indexed_indirect_count(
         buffer: vk::Buffer, offset: vk::DeviceSize, counts: vk::Buffer, count_offset: vk::DeviceSize,
         most: u32, stride: u32
-    ) |own, state, faults| {
-        let _ = (counts, count_offset, most, stride);
+    ) with own |state, faults| {
         let call = Call::Indirect(buffer, offset, true);
         rules::draw::check(state.0, call, state.1, &own.facts, faults);
     }
     cmd_copy_buffer(from: vk::Buffer, to: vk::Buffer, count: u32, regions: *const vk::BufferCopy)
-        |own, state, _faults| {
-        let _ = &own;
+        |state, _faults| {
         let regions = slice(regions, count).to_vec();
         state.0.operations.push(Operation::Copy(from, to, regions));
     }
-    cmd_copy_buffer2(info: *const vk::CopyBufferInfo2<'_>) |own, state, _faults| {
-        let _ = &own;
+    cmd_copy_buffer2(info: *const vk::CopyBufferInfo2<'_>) |state, _faults| {
         let info = &*info;
         let regions = slice(info.p_regions, info.region_count).iter();
         let regions = regions.map(|region| vk::BufferCopy {
@@ -387,85 +356,73 @@ records! {
     }
     cmd_update_buffer(
         buffer: vk::Buffer, offset: vk::DeviceSize, size: vk::DeviceSize, data: *const std::ffi::c_void
-    ) |own, state, _faults| {
-        let _ = &own;
+    ) |state, _faults| {
         let bytes = slice(data.cast::<u8>(), u32::try_from(size).unwrap_or(0)).to_vec();
         state.0.operations.push(Operation::Update(buffer, offset, Arc::new(bytes)));
     }
-    cmd_fill_buffer(buffer: vk::Buffer, offset: vk::DeviceSize, size: vk::DeviceSize, word: u32) |own, state, _faults| {
-        let _ = &own;
+    cmd_fill_buffer(buffer: vk::Buffer, offset: vk::DeviceSize, size: vk::DeviceSize, word: u32) |state, _faults| {
         state.0.operations.push(Operation::Fill(buffer, offset, size, word));
     }
     cmd_copy_image_to_buffer(
         image: vk::Image, layout: vk::ImageLayout, buffer: vk::Buffer, count: u32, regions: *const vk::BufferImageCopy
-    ) |own, state, _faults| {
-        let _ = (&own, image, layout, count, regions);
+    ) |state, _faults| {
         state.0.operations.push(Operation::Write(buffer));
     }
-    cmd_copy_image_to_buffer2(info: *const vk::CopyImageToBufferInfo2<'_>) |own, state, _faults| {
-        let _ = &own;
+    cmd_copy_image_to_buffer2(info: *const vk::CopyImageToBufferInfo2<'_>) |state, _faults| {
         state.0.operations.push(Operation::Write((*info).dst_buffer));
     }
-    cmd_set_gaussian_cameras(count: u32, cameras: *const gvk::GaussianCameraGAURAST<'_>) |own, state, faults| {
+    cmd_set_gaussian_cameras(count: u32, cameras: *const gvk::GaussianCameraGAURAST<'_>) with own |state, faults| {
         // What is wrongly many is not looked at.
         let cameras = slice(cameras, if count > own.facts.max_views { 0 } else { count });
         let right = rules::camera::check_command(cameras, count, &own.facts, faults);
         state.0.cameras = right.map(Arc::new).or(state.0.cameras.take());
     }
-    cmd_begin_gaussian_set() |own, state, faults| {
+    cmd_begin_gaussian_set() with own |state, faults| {
         rules::set::begin(state.0, &own.facts, faults);
     }
-    cmd_end_gaussian_set() |own, state, faults| {
+    cmd_end_gaussian_set() with own |state, faults| {
         rules::set::end(state.0, &own.facts, faults);
     }
-    cmd_set_gaussian_order(order: gvk::GaussianOrderGAURAST) |own, state, faults| {
-        let _ = &own;
+    cmd_set_gaussian_order(order: gvk::GaussianOrderGAURAST) |state, faults| {
         dynamic::check_order(order, faults);
         set_own(state.0, gvk::DYNAMIC_STATE_GAUSSIAN_ORDER_GAURAST, order.as_raw().cast_unsigned(), faults);
     }
-    cmd_set_gaussian_antialiasing(antialiasing: gvk::GaussianAntialiasingGAURAST) |own, state, faults| {
-        let _ = &own;
+    cmd_set_gaussian_antialiasing(antialiasing: gvk::GaussianAntialiasingGAURAST) |state, faults| {
         dynamic::check_antialiasing(antialiasing, faults);
         let bits = antialiasing.as_raw().cast_unsigned();
         set_own(state.0, gvk::DYNAMIC_STATE_GAUSSIAN_ANTIALIASING_GAURAST, bits, faults);
     }
-    cmd_set_gaussian_low_pass_variance(value: f32) |own, state, faults| {
-        let _ = &own;
+    cmd_set_gaussian_low_pass_variance(value: f32) |state, faults| {
         dynamic::check_low_pass_variance(value, faults);
         set_own(state.0, gvk::DYNAMIC_STATE_GAUSSIAN_LOW_PASS_VARIANCE_GAURAST, value.to_bits(), faults);
     }
-    cmd_set_gaussian_alpha_floor(value: f32) |own, state, faults| {
-        let _ = &own;
+    cmd_set_gaussian_alpha_floor(value: f32) |state, faults| {
         dynamic::check_alpha_floor(value, faults);
         set_own(state.0, gvk::DYNAMIC_STATE_GAUSSIAN_ALPHA_FLOOR_GAURAST, value.to_bits(), faults);
     }
-    cmd_set_gaussian_alpha_ceiling(value: f32) |own, state, faults| {
-        let _ = &own;
+    cmd_set_gaussian_alpha_ceiling(value: f32) |state, faults| {
         dynamic::check_alpha_ceiling(value, faults);
         set_own(state.0, gvk::DYNAMIC_STATE_GAUSSIAN_ALPHA_CEILING_GAURAST, value.to_bits(), faults);
     }
-    cmd_set_gaussian_transmittance_floor(value: f32) |own, state, faults| {
-        let _ = &own;
+    cmd_set_gaussian_transmittance_floor(value: f32) |state, faults| {
         dynamic::check_transmittance_floor(value, faults);
         set_own(state.0, gvk::DYNAMIC_STATE_GAUSSIAN_TRANSMITTANCE_FLOOR_GAURAST, value.to_bits(), faults);
     }
-    cmd_set_gaussian_spherical_harmonics_degree(degree: u32) |own, state, faults| {
+    cmd_set_gaussian_spherical_harmonics_degree(degree: u32) with own |state, faults| {
         dynamic::check_degree(degree, &own.facts, faults);
         set_own(state.0, gvk::DYNAMIC_STATE_GAUSSIAN_SPHERICAL_HARMONICS_DEGREE_GAURAST, degree, faults);
     }
-    cmd_set_gaussian_exponential_error(value: f32) |own, state, faults| {
-        let _ = &own;
+    cmd_set_gaussian_exponential_error(value: f32) |state, faults| {
         dynamic::check_exponential_error(value, faults);
         set_own(state.0, gvk::DYNAMIC_STATE_GAUSSIAN_EXPONENTIAL_ERROR_GAURAST, value.to_bits(), faults);
     }
-    cmd_set_gaussian_contribution_budget(value: f32) |own, state, faults| {
-        let _ = &own;
+    cmd_set_gaussian_contribution_budget(value: f32) |state, faults| {
         dynamic::check_contribution_budget(value, faults);
         set_own(state.0, gvk::DYNAMIC_STATE_GAUSSIAN_CONTRIBUTION_BUDGET_GAURAST, value.to_bits(), faults);
     }
     cmd_bind_gaussian_spherical_harmonics(
         buffer: *const gvk::GaussianSphericalHarmonicsBufferGAURAST<'_>
-    ) |own, state, faults| {
+    ) with own |state, faults| {
         let (recording, objects) = state;
         let Some(bound) = buffer.as_ref() else { return };
         let fetches = |format| {

@@ -150,7 +150,7 @@ fn direct(call: Call, reader: &dyn Reader, facts: &Facts, faults: &mut Faults) -
     let gaussians = u64::from(count) * u64::from(instances);
     if facts.has_extension && gaussians > facts.max_gaussians_per_draw {
         faults.error(
-            "GAURAST-Draw-maxGaussiansPerDraw",
+            "VUID-vkCmdDraw-maxGaussiansPerDraw-90083",
             format!(
                 "the indirect draw has {gaussians} Gaussians, but must not have more than {}",
                 facts.max_gaussians_per_draw

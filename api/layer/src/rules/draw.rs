@@ -260,7 +260,7 @@ fn check_ranges(
     let gaussians = u64::from(count) * u64::from(instances);
     if facts.has_extension && gaussians > facts.max_gaussians_per_draw {
         return faults.error(
-            "GAURAST-Draw-maxGaussiansPerDraw",
+            "VUID-vkCmdDraw-maxGaussiansPerDraw-90083",
             format!(
                 "the draw has {gaussians} Gaussians, but must not have more than {}",
                 facts.max_gaussians_per_draw

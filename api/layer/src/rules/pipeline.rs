@@ -168,27 +168,25 @@ fn check_fixed_function(request: &Request, faults: &mut Faults) {
     );
     faults.require(
         !request.discards,
-        "GAURAST-Pipeline-rasterizer-discard",
-        || "rasterizerDiscardEnable is VK_TRUE, but must be VK_FALSE (Interactions)".to_owned(),
+        "VUID-VkGraphicsPipelineCreateInfo-rasterizerDiscardEnable-90080",
+        || "rasterizerDiscardEnable is VK_TRUE, but must be VK_FALSE".to_owned(),
     );
     faults.require(
         request.viewport_count == 1,
-        "GAURAST-Pipeline-viewport-count",
-        || {
-            format!(
-                "viewportCount is {}, but must be 1 (Interactions)",
-                request.viewport_count
-            )
-        },
+        "VUID-VkGraphicsPipelineCreateInfo-viewportCount-90081",
+        || format!("viewportCount is {}, but must be 1", request.viewport_count),
     );
     for state in [
         vk::DynamicState::PRIMITIVE_RESTART_ENABLE,
         vk::DynamicState::RASTERIZER_DISCARD_ENABLE,
+        vk::DynamicState::VERTEX_INPUT_EXT,
+        vk::DynamicState::ALPHA_TO_COVERAGE_ENABLE_EXT,
+        vk::DynamicState::ALPHA_TO_ONE_ENABLE_EXT,
     ] {
         faults.require(
             !request.is_dynamic(state),
-            "GAURAST-Pipeline-dynamic-state",
-            || format!("{state:?} must not be dynamic in a Gaussian pipeline (Interactions)"),
+            "VUID-VkGraphicsPipelineCreateInfo-pDynamicStates-90082",
+            || format!("{state:?} must not be dynamic in a Gaussian pipeline"),
         );
     }
 }

@@ -4,6 +4,7 @@
 use super::descriptors::{self, DescriptorSetNotBound};
 use super::state::State;
 use crate::command::DrawParameters;
+use crate::physical_device::limits::MAX_GAUSSIANS;
 use crate::pipeline::GraphicsPipeline;
 use crate::pipeline::primitives::{PrimitivePipeline, ViewportSource};
 use crate::pipeline::stages;
@@ -94,6 +95,13 @@ pub(crate) enum DrawError {
         "a dynamic state was set to what the pipeline may not have: {0} (VUID-vkCmdDraw-dynamic-90060)"
     )]
     DynamicValue(String),
+    /// There are more Gaussians than a draw may have.
+    #[error(
+        "it has {0} Gaussians, but must have at most maxGaussiansPerDraw ({most}) \
+         (VUID-vkCmdDraw-maxGaussiansPerDraw-90083)",
+        most = MAX_GAUSSIANS
+    )]
+    TooManyGaussians(u64),
     /// No buffer of spherical harmonics is bound.
     #[error(
         "no buffer of spherical harmonics is bound, which the pipeline's flags ask for \

@@ -4,6 +4,7 @@ use super::descriptors::{self, DescriptorSetNotBound};
 use super::draw::{DrawError, attribute_stream, indices};
 use super::state::State;
 use crate::command::{DrawParameters, HarmonicsBuffer, camera};
+use crate::physical_device::limits::MAX_GAUSSIANS;
 use crate::pipeline::GraphicsPipeline;
 use crate::pipeline::gaussian::stages::{ResolveStage, VertexProjection};
 use crate::pipeline::gaussian::{
@@ -73,7 +74,7 @@ pub(crate) fn begin(state: &State, gaussian: &GaussianPipeline) -> Result<Begin,
 /// The packet that adds a draw to a sorted set, whose beginning is `set`.
 ///
 /// # Errors
-/// [`DrawError`] where a buffer that the draw needs is not bound.
+/// [`DrawError`] where a buffer that the draw needs is not bound, or where it has too many Gaussians.
 pub(crate) fn append(
     state: &State,
     pipeline: &GraphicsPipeline,
@@ -82,6 +83,10 @@ pub(crate) fn append(
     draw: &DrawParameters,
     draw_index: u32,
 ) -> Result<Packet, DrawError> {
+    let count = u64::from(draw.count) * u64::from(draw.instance_count);
+    if count > MAX_GAUSSIANS {
+        return Err(DrawError::TooManyGaussians(count));
+    }
     let sources = match &gaussian.source {
         GaussianSource::Attributes(sources) => sources,
         GaussianSource::VertexShader(projection) => {

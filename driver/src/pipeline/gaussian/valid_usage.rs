@@ -618,8 +618,9 @@ pub(super) fn fixed_state(info: &GraphicsState, features: &Features) -> Result<(
         .rasterizer_discard_enable
         != vk::FALSE
     {
-        return Err(Error::FeatureNotPresent(
-            "rasterizerDiscardEnable with Gaussians".into(),
+        return Err(Error::usage(
+            "VUID-VkGraphicsPipelineCreateInfo-rasterizerDiscardEnable-90080",
+            "rasterizerDiscardEnable is VK_TRUE, but must be VK_FALSE with Gaussians",
         ));
     }
     if info.dynamic.iter().copied().any(is_of_gaussians) {
@@ -632,9 +633,10 @@ pub(super) fn fixed_state(info: &GraphicsState, features: &Features) -> Result<(
         .iter()
         .find(|state| !may_gaussians_have(**state))
     {
-        return Err(Error::FeatureNotPresent(format!(
-            "the dynamic state {state:?} with Gaussians"
-        )));
+        return Err(Error::usage(
+            "VUID-VkGraphicsPipelineCreateInfo-pDynamicStates-90082",
+            format!("{state:?} must not be dynamic in a Gaussian pipeline"),
+        ));
     }
     if !shades && info.fragment_output.blend.iter().any(reads_second_source) {
         return Err(Error::FeatureNotPresent(
@@ -644,7 +646,7 @@ pub(super) fn fixed_state(info: &GraphicsState, features: &Features) -> Result<(
     }
     if info.pre_rasterization.viewport_count > 1 {
         return Err(Error::usage(
-            "VUID-VkPipelineViewportStateCreateInfo-viewportCount-01216",
+            "VUID-VkGraphicsPipelineCreateInfo-viewportCount-90081",
             "viewportCount is greater than 1, but Gaussians go to one viewport",
         ));
     }

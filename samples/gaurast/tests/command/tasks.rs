@@ -611,12 +611,16 @@ fn a_programs_pictures_on_two_drivers_are_compared() {
         said.contains("1.0 steps of 255, and 0.5 are allowed"),
         "{said}"
     );
-    // A folder that is not empty; a program that fails; a driver that is missing.
+    // A folder that is not empty; a program that fails, or writes nothing; a driver that is missing.
     for (output, sentence) in [
         (compare(&[], "true", &[]), "--force writes into it"),
         (
             compare(&["--out", "b"], "exit 3", &[]),
             "on gaurast it ended with exit status: 3",
+        ),
+        (
+            compare(&["--out", "none"], "true", &[]),
+            "sh: it wrote no picture",
         ),
         (
             gaurast(

@@ -1,0 +1,34 @@
+//! A verdict on a picture of a scene: `verdict SCENE PICTURE.exr`. The picture holds premultiplied floats, as `gaurast SCENE -o
+//! PICTURE.exr` or another renderer writes them, and is seen by the camera that the `gaurast` command chooses.
+
+use std::error::Error;
+use std::path::Path;
+use std::process::ExitCode;
+
+use gaurast_oracle::compare::{Limits, verdict};
+use gaurast_oracle::oracle::{OracleCamera, OracleState, render_bounded};
+use gaurast_oracle::scenes::SceneBuffers;
+use gaurast_scene::camera::DEFAULT_FOV;
+
+fn main() -> Result<ExitCode, Box<dyn Error>> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [scene, picture] = &arguments[..] else {
+        return Err("the arguments are a scene and a picture in .exr".into());
+    };
+    let scene = gaurast_scene::open(scene)?;
+    let picture = gaurast_picture::read(Path::new(picture))?;
+    let size = [picture.width, picture.height];
+    let camera = gaurast_scene::frame(&scene, DEFAULT_FOV, size).to_vulkan();
+    let camera =
+        OracleCamera::new(&camera, size).ok_or("a camera that the oracle does not know")?;
+    let buffers = SceneBuffers::from(&scene);
+    // The state of the picture: 3DGS's defaults, in the order of view depth.
+    let reference = render_bounded(&buffers.as_oracle(), &camera, &OracleState::default());
+    let verdict = verdict(&picture.pixels, &reference, Limits::CONTRACT);
+    println!("{verdict}");
+    Ok(if verdict.holds() {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
+    })
+}
