@@ -123,7 +123,12 @@ pub struct Drawn {
     pub index: usize,
     pub time: Duration,
     pub counters: Vec<gaurast_render::Counter>,
-    /// The reason for which the picture is empty, if it is.
+    /// A number with four significant digits.
+fn short(number: f64) -> f64 {
+    format!("{number:.3e}").parse().unwrap_or(number)
+}
+
+/// The reason for which the picture is empty, if it is.
     pub nothing: Option<String>,
 }
 
@@ -248,8 +253,8 @@ fn reasons(frame: &Frame, view: &View) -> Option<String> {
         .filter(|counter| counter.category == "gaussians skipped" && counter.value > 0.0)
         .map(|counter| {
             let plane = match counter.name.as_str() {
-                "before near plane" => format!(" (--near {})", view.camera.near),
-                "beyond far plane" => format!(" (--far {})", view.camera.far),
+                "before near plane" => format!(" (--near {})", short(view.camera.near)),
+                "beyond far plane" => format!(" (--far {})", short(view.camera.far)),
                 _ => String::new(),
             };
             format!("{} {}{plane}", counter.value, counter.name)

@@ -81,6 +81,11 @@ pub fn run(arguments: &RenderArguments) -> Result<(), Error> {
     settings.depth = arguments.output.depth;
     for view in &views {
         settings.check(&view.camera).map_err(DrawError::Render)?;
+        if !scene.mesh().is_empty() {
+            settings
+                .check_mesh(&view.camera)
+                .map_err(DrawError::Render)?;
+        }
     }
     let indices = chosen(&views, arguments, &outputs)?;
     let largest = indices.iter().map(|index| &views[*index].camera);

@@ -73,10 +73,15 @@ impl Summary<'_> {
         let places = self.outputs.told(view(first), view(last));
         let camera = &self.views[first.index].camera;
         let size = format!("{}x{}", camera.width, camera.height);
-        let gaussians = match self.scene.len() {
-            1 => "1 Gaussian".to_owned(),
-            count => format!("{} Gaussians", grouped(count as f64)),
+        let counted = |count: usize, name: &str| match count {
+            1 => format!("1 {name}"),
+            count => format!("{} {name}s", grouped(count as f64)),
         };
+        let mut contents = counted(self.scene.len(), "Gaussian");
+        match self.scene.mesh().triangles() {
+            0 => {}
+            triangles => contents += &format!(" and {}", counted(triangles, "triangle")),
+        }
         let time = if self.drawn.len() == 1 {
             format!("drawn in {}", duration(first.time))
         } else {
@@ -87,7 +92,7 @@ impl Summary<'_> {
             )
         };
         format!(
-            "wrote {places}: {size}, {gaussians} read in {}, {time}{kept}",
+            "wrote {places}: {size}, {contents} read in {}, {time}{kept}",
             duration(self.loading)
         )
     }
@@ -158,6 +163,7 @@ impl Summary<'_> {
             "scenes": self.files,
             "gaussians": self.scene.len(),
             "sh_degree": self.scene.sh_degree(),
+            "triangles": self.scene.mesh().triangles(),
             "load_milliseconds": milliseconds(self.loading),
             "milliseconds": milliseconds(self.drawing),
             "kept": self.kept,
