@@ -123,12 +123,7 @@ pub struct Drawn {
     pub index: usize,
     pub time: Duration,
     pub counters: Vec<gaurast_render::Counter>,
-    /// A number with four significant digits.
-fn short(number: f64) -> f64 {
-    format!("{number:.3e}").parse().unwrap_or(number)
-}
-
-/// The reason for which the picture is empty, if it is.
+    /// The reason for which the picture is empty, if it is.
     pub nothing: Option<String>,
 }
 
@@ -236,6 +231,11 @@ impl Drawing {
         })?;
         Ok(drawn)
     }
+}
+
+/// A number with four significant digits.
+fn short(number: f64) -> f64 {
+    format!("{number:.3e}").parse().unwrap_or(number)
 }
 
 /// The reason for which the picture is empty, if it is, with counts of the skipped Gaussians.
