@@ -128,17 +128,18 @@ pub struct Drawn {
 }
 
 impl Drawing {
-    /// Creates a device for `scene` and `settings`.
+    /// Creates a device for `scene` and `settings`. The scene's copy in host memory is freed.
     ///
     /// # Errors
     /// If there is no device, not enough memory, or too many threads are requested.
-    pub fn new(scene: &Scene, settings: Settings, counters: bool) -> Result<Self, DrawError> {
+    pub fn new(scene: Scene, settings: Settings, counters: bool) -> Result<Self, DrawError> {
         limits::check_threads().map_err(DrawError::Limit)?;
         let mut renderer = Renderer::new(vulkan_gaurast::entry())?;
         if counters {
             renderer.count_everything()?;
         }
-        let mut uploaded = renderer.upload(scene, Some(settings.sh_degree))?;
+        let mut uploaded = renderer.upload(&scene, Some(settings.sh_degree))?;
+        drop(scene);
         renderer.set(&mut uploaded, settings)?;
         Ok(Self {
             renderer,

@@ -14,7 +14,7 @@ use crate::heatmap::{self, HeatmapError};
 use crate::limits;
 use crate::outputs::{Outputs, WriteError};
 use crate::progress::Progress;
-use crate::report::{self, Summary};
+use crate::report::{self, Contents, Summary};
 use crate::sources::{Source, SourceError};
 
 /// A failure of the command. Displayed as one sentence.
@@ -98,12 +98,13 @@ pub fn run(arguments: &RenderArguments) -> Result<(), Error> {
         return Err(Error::HeatmapViews(indices.len()));
     }
 
+    let contents = Contents::of(&scene);
     let start = Instant::now();
     let drawn = if indices.is_empty() {
         Vec::new()
     } else {
         let step = progress.step("uploading");
-        let mut drawing = Drawing::new(&scene, settings, arguments.report.counters)?;
+        let mut drawing = Drawing::new(scene, settings, arguments.report.counters)?;
         step.finish_and_clear();
         drawing.all(
             &views,
@@ -122,7 +123,7 @@ pub fn run(arguments: &RenderArguments) -> Result<(), Error> {
         _ => None,
     };
     let summary = Summary {
-        scene: &scene,
+        contents,
         files: &arguments.scene.scenes,
         loading,
         drawing: start.elapsed(),
