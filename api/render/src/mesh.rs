@@ -78,14 +78,9 @@ pub(crate) fn to_clip(camera: &Camera) -> [f32; 16] {
         ]
     };
     let dot = |a: [f64; 3], b: [f64; 3]| (0..3).map(|i| a[i] * b[i]).sum::<f64>();
-    let [right, down, forward] = camera.rotation;
-    let view: [[f64; 4]; 4] = [right, down, forward]
-        .map(|axis| [axis[0], axis[1], axis[2], -dot(axis, camera.eye)])
-        .into_iter()
-        .chain([[0., 0., 0., 1.]])
-        .collect::<Vec<_>>()
-        .try_into()
-        .unwrap_or_default();
+    let row = |axis: [f64; 3]| [axis[0], axis[1], axis[2], -dot(axis, camera.eye)];
+    let [right, down, forward] = camera.rotation.map(row);
+    let view = [right, down, forward, [0., 0., 0., 1.]];
     let entry = |row: usize, column: usize| {
         (0..4)
             .map(|k| projection[row][k] * view[k][column])
