@@ -211,7 +211,9 @@ mod tests {
 
     #[test]
     fn linear_light_becomes_srgb() {
-        assert_eq!((srgb(0.0), srgb(2.0)), (0.0, 1.0));
+        assert_eq!(srgb(0.0), 0.0);
+        // 1.055 - 0.055 is rounded in binary32.
+        assert!((srgb(2.0) - 1.0).abs() <= f32::EPSILON);
         assert!((srgb(0.214_041_14) - 0.5).abs() < 1e-5);
     }
 }
