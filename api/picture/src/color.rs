@@ -22,7 +22,7 @@ impl Background {
 }
 
 /// The named colours: CSS's basic ones.
-const NAMES: [(&str, [u8; 3]); 17] = [
+const NAMES: [(&str, [u8; 3]); 20] = [
     ("black", [0, 0, 0]),
     ("silver", [192, 192, 192]),
     ("gray", [128, 128, 128]),
@@ -32,6 +32,7 @@ const NAMES: [(&str, [u8; 3]); 17] = [
     ("red", [255, 0, 0]),
     ("purple", [128, 0, 128]),
     ("magenta", [255, 0, 255]),
+    ("fuchsia", [255, 0, 255]),
     ("green", [0, 128, 0]),
     ("lime", [0, 255, 0]),
     ("olive", [128, 128, 0]),
@@ -39,6 +40,8 @@ const NAMES: [(&str, [u8; 3]); 17] = [
     ("navy", [0, 0, 128]),
     ("blue", [0, 0, 255]),
     ("cyan", [0, 255, 255]),
+    ("aqua", [0, 255, 255]),
+    ("teal", [0, 128, 128]),
     ("orange", [255, 165, 0]),
 ];
 
@@ -66,8 +69,8 @@ impl FromStr for Background {
             .and_then(|numbers| numbers.try_into().ok())
             .map(Self::Color)
             .ok_or(
-                "a colour is transparent, a name such as white, #rgb, #rrggbb, or three numbers with commas between \
-                 them, each 0 to 1",
+                "a colour is transparent, one of CSS's basic names such as white, #rgb, #rrggbb, or three numbers with \
+                 commas between them, each 0 to 1",
             )
     }
 }
@@ -97,6 +100,7 @@ mod tests {
             assert_eq!(color(white), Ok(Background::Color([1.0; 3])), "{white}");
         }
         assert_eq!(color("#0f8"), color("#00ff88"));
+        assert_eq!(color("teal"), color("#008080"));
         assert_eq!(color("0,0.5,-1"), Ok(Background::Color([0.0, 0.5, -1.0])));
         for bad in [
             "", "whitish", "#ff", "#ggg", "1,1", "1,1,nan", "1,1,1,1", "#+1+1+1",

@@ -1,5 +1,6 @@
 //! Scenes in device memory.
 
+use crate::mesh::DeviceMesh;
 use crate::pipeline::{BINDINGS, GaussianPipeline};
 use crate::resource::Buffer;
 use crate::settings::Settings;
@@ -13,4 +14,6 @@ pub struct DeviceScene {
     pub(crate) pipeline: GaussianPipeline,
     /// A buffer for each of [`BINDINGS`].
     pub(crate) buffers: [Buffer; BINDINGS],
+    /// The triangles among the Gaussians, if there are any.
+    pub(crate) mesh: Option<DeviceMesh>,
 }

@@ -5,6 +5,7 @@ use gaurast::gaussian_primitive_topology;
 
 use crate::device::Device;
 use crate::device_scene::DeviceScene;
+use crate::mesh;
 use crate::pipeline::BINDINGS;
 use crate::resource::{Buffer, Image};
 use crate::target::Target;
@@ -20,12 +21,15 @@ pub(super) struct Recorder<'a> {
 }
 
 impl Recorder<'_> {
-    /// Draws `scene` into the target's image, which is then in the layout of a colour attachment.
+    /// Draws `scene`, its triangles first, into the target's image, which is then in the layout of a colour attachment.
     pub(super) fn record(&self, target: &Target, scene: &DeviceScene, camera: &Camera) {
         let (image, pipeline) = (&target.image, &scene.pipeline);
         let mut vulkan = camera.to_vulkan();
         if target.depths.is_some() {
             vulkan = vulkan.depth_coefficients(DepthScale::of(camera).coefficients);
+        }
+        if scene.mesh.is_some() {
+            vulkan = vulkan.depth_coefficients(mesh::depth_coefficients(camera));
         }
         let area = vk::Rect2D::default().extent(image.extent());
         let viewport = vk::Viewport::default()
@@ -41,10 +45,19 @@ impl Recorder<'_> {
         };
         let depths = target.depths.as_ref().map(|(image, _)| image);
         let attachments: Vec<_> = [image].into_iter().chain(depths).map(attachment).collect();
-        let rendering = vk::RenderingInfo::default()
+        let mut rendering = vk::RenderingInfo::default()
             .render_area(area)
             .layer_count(1)
             .color_attachments(&attachments);
+        // Depth 0, of what is infinitely far, is what attachments are cleared to.
+        let tested = target.tested.as_ref().map(|image| {
+            attachment(image)
+                .image_layout(vk::ImageLayout::DEPTH_ATTACHMENT_OPTIMAL)
+                .store_op(vk::AttachmentStoreOp::DONT_CARE)
+        });
+        if let Some(tested) = &tested {
+            rendering = rendering.depth_attachment(tested);
+        }
         let buffers = scene.buffers.each_ref().map(Buffer::handle);
         use vk::PipelineStageFlags as Stage;
         for image in [image].into_iter().chain(depths) {
@@ -60,6 +73,19 @@ impl Recorder<'_> {
                 to_attachment,
             );
         }
+        if let Some(image) = &target.tested {
+            let tests = Stage::EARLY_FRAGMENT_TESTS | Stage::LATE_FRAGMENT_TESTS;
+            let (from, to) = (
+                vk::ImageLayout::UNDEFINED,
+                vk::ImageLayout::DEPTH_ATTACHMENT_OPTIMAL,
+            );
+            let writes = vk::AccessFlags::DEPTH_STENCIL_ATTACHMENT_WRITE;
+            let to_attachment = image
+                .barrier(from, to)
+                .src_access_mask(writes)
+                .dst_access_mask(writes | vk::AccessFlags::DEPTH_STENCIL_ATTACHMENT_READ);
+            self.barrier(tests, tests, to_attachment);
+        }
         let raw = self.device.raw();
         let commands = self.commands;
         // SAFETY: the command buffer is recording; image, pipeline and buffers belong to the same
@@ -67,10 +93,25 @@ impl Recorder<'_> {
         // buffers and camera are all set before the draw, whose vertices lie within the buffers.
         unsafe {
             raw.cmd_begin_rendering(commands, &rendering);
-            raw.cmd_bind_pipeline(commands, vk::PipelineBindPoint::GRAPHICS, pipeline.handle());
-            raw.cmd_bind_vertex_buffers(commands, 0, &buffers, &[0; BINDINGS]);
             raw.cmd_set_viewport(commands, 0, &[viewport]);
             raw.cmd_set_scissor(commands, 0, &[area]);
+            if let Some(mesh) = &scene.mesh {
+                let (handle, layout) = (mesh.pipeline.handle(), mesh.pipeline.layout());
+                let to_clip = mesh::to_clip(camera);
+                let constants = bytemuck::bytes_of(&to_clip);
+                raw.cmd_bind_pipeline(commands, vk::PipelineBindPoint::GRAPHICS, handle);
+                raw.cmd_bind_vertex_buffers(commands, 0, &[mesh.buffer.handle()], &[0]);
+                raw.cmd_push_constants(
+                    commands,
+                    layout,
+                    vk::ShaderStageFlags::VERTEX,
+                    0,
+                    constants,
+                );
+                raw.cmd_draw(commands, mesh.vertices, 1, 0, 0);
+            }
+            raw.cmd_bind_pipeline(commands, vk::PipelineBindPoint::GRAPHICS, pipeline.handle());
+            raw.cmd_bind_vertex_buffers(commands, 0, &buffers, &[0; BINDINGS]);
             (self.gaussian).cmd_set_gaussian_cameras(commands, &[vulkan]);
             raw.cmd_draw(commands, scene.count, 1, 0, 0);
             raw.cmd_end_rendering(commands);

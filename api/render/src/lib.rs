@@ -30,6 +30,7 @@ pub mod device;
 mod device_scene;
 mod draw;
 mod error;
+mod mesh;
 mod modes;
 mod pipeline;
 pub mod process_stats;

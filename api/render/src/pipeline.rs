@@ -12,7 +12,7 @@ use gaurast::vk::{
 use crate::device::Device;
 use crate::error::{During, RenderError};
 use crate::settings::Settings;
-use crate::target::DEPTHS_FORMAT;
+use crate::target::{DEPTH_FORMAT, DEPTHS_FORMAT};
 use gaurast_scene::GaussianShape;
 
 /// The number of vertex buffers: positions, shapes, spherical harmonics.
@@ -32,12 +32,14 @@ pub(super) struct GaussianPipeline {
 impl GaussianPipeline {
     /// A pipeline for vertex buffers of `strides`. It draws with `settings`, whose degree must be stored, into an
     /// attachment of `format`, whose contents it replaces. If the settings have depths, it writes them to a second
-    /// attachment, of [`DEPTHS_FORMAT`].
+    /// attachment, of [`DEPTHS_FORMAT`]. If there are triangles (`over_mesh`), Gaussians are blended over them, and a
+    /// depth test leaves out those behind them.
     pub(super) fn new(
         device: &Arc<Device>,
         strides: [u32; BINDINGS],
         settings: Settings,
         format: vk::Format,
+        over_mesh: bool,
     ) -> Result<Self, RenderError> {
         let raw = device.raw();
         // SAFETY: the structure is valid.
@@ -67,18 +69,37 @@ impl GaussianPipeline {
         let multisample = vk::PipelineMultisampleStateCreateInfo::default()
             .rasterization_samples(vk::SampleCountFlags::TYPE_1);
         // Without blending, (C, 1 - T) is written to the attachment.
+        let (one, rest) = (vk::BlendFactor::ONE, vk::BlendFactor::ONE_MINUS_SRC_ALPHA);
         let attachments = [vk::PipelineColorBlendAttachmentState::default()
-            .color_write_mask(vk::ColorComponentFlags::RGBA); 2];
+            .color_write_mask(vk::ColorComponentFlags::RGBA)
+            .blend_enable(over_mesh)
+            .src_color_blend_factor(one)
+            .dst_color_blend_factor(rest)
+            .src_alpha_blend_factor(one)
+            .dst_alpha_blend_factor(rest); 2];
+        let depth_test = vk::PipelineDepthStencilStateCreateInfo::default()
+            .depth_test_enable(over_mesh)
+            .depth_compare_op(vk::CompareOp::GREATER);
         let formats = [format, DEPTHS_FORMAT];
         let count = if settings.depth { 2 } else { 1 };
         let blend =
             vk::PipelineColorBlendStateCreateInfo::default().attachments(&attachments[..count]);
-        let module = ShaderModule::new(device, settings.depth)?;
-        let stages = module.stages();
+        let module = if settings.depth {
+            let words = shader_words(include_bytes!("shaders/depths.frag.spv"));
+            Some(ShaderModule::new(device, &words)?)
+        } else {
+            None
+        };
+        let stages: Vec<_> = (module.iter())
+            .map(|module| module.stage(vk::ShaderStageFlags::FRAGMENT))
+            .collect();
         let dynamic_states = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
         let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic_states);
         let mut rendering =
             vk::PipelineRenderingCreateInfo::default().color_attachment_formats(&formats[..count]);
+        if over_mesh {
+            rendering = rendering.depth_attachment_format(DEPTH_FORMAT);
+        }
         let mut gaussian = PipelineGaussianStateCreateInfoGAURAST::default()
             .spherical_harmonics_degree(settings.sh_degree)
             .alpha_floor(settings.alpha_floor)
@@ -111,7 +132,7 @@ impl GaussianPipeline {
             .cut_off(settings.cut_off.raw())
             .cut_off_deviations(settings.cut_off_deviations)
             .compensation_floor(settings.compensation_floor);
-        let create_info = vk::GraphicsPipelineCreateInfo::default()
+        let mut create_info = vk::GraphicsPipelineCreateInfo::default()
             .stages(&stages)
             .vertex_input_state(&vertex_input)
             .input_assembly_state(&input_assembly)
@@ -125,6 +146,9 @@ impl GaussianPipeline {
             .push_next(&mut approximation)
             .push_next(&mut footprint)
             .push_next(&mut rendering);
+        if over_mesh {
+            create_info = create_info.depth_stencil_state(&depth_test);
+        }
         // SAFETY: the structures are valid and live until the call returns.
         let created = unsafe {
             raw.create_graphics_pipelines(vk::PipelineCache::null(), &[create_info], None)
@@ -141,49 +165,48 @@ impl GaussianPipeline {
     }
 }
 
-/// The fragment shader that writes a pixel's colour and depths; null if there is none.
-struct ShaderModule {
+/// The words of a SPIR-V module.
+pub(super) fn shader_words(bytes: &[u8]) -> Vec<u32> {
+    let words = bytes.chunks_exact(4);
+    words
+        .map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]]))
+        .collect()
+}
+
+/// A shader of one entry point, `main`.
+pub(super) struct ShaderModule {
     handle: vk::ShaderModule,
     device: Arc<Device>,
 }
 
 impl ShaderModule {
-    /// Creates the module, if depths are `wanted`.
-    fn new(device: &Arc<Device>, wanted: bool) -> Result<Self, RenderError> {
-        let mut module = Self {
-            handle: vk::ShaderModule::null(),
+    /// Creates the module of `words`.
+    pub(super) fn new(device: &Arc<Device>, words: &[u32]) -> Result<Self, RenderError> {
+        let create_info = vk::ShaderModuleCreateInfo::default().code(words);
+        // SAFETY: the structure is valid, and the code is a shader of SPIR-V.
+        let handle = unsafe { device.raw().create_shader_module(&create_info, None) }
+            .during("vkCreateShaderModule")?;
+        Ok(Self {
+            handle,
             device: device.clone(),
-        };
-        if wanted {
-            let words: Vec<u32> = include_bytes!("shaders/depths.frag.spv")
-                .chunks_exact(4)
-                .map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]]))
-                .collect();
-            let create_info = vk::ShaderModuleCreateInfo::default().code(&words);
-            // SAFETY: the structure is valid, and the code is a fragment shader of SPIR-V.
-            module.handle = unsafe { device.raw().create_shader_module(&create_info, None) }
-                .during("vkCreateShaderModule")?;
-        }
-        Ok(module)
+        })
     }
 
-    /// The pipeline stages that use the module.
-    fn stages(&self) -> Vec<vk::PipelineShaderStageCreateInfo<'static>> {
-        let stage = vk::PipelineShaderStageCreateInfo::default()
-            .stage(vk::ShaderStageFlags::FRAGMENT)
+    /// The pipeline stage of the module.
+    pub(super) fn stage(
+        &self,
+        stage: vk::ShaderStageFlags,
+    ) -> vk::PipelineShaderStageCreateInfo<'static> {
+        vk::PipelineShaderStageCreateInfo::default()
+            .stage(stage)
             .module(self.handle)
-            .name(c"main");
-        if self.handle == vk::ShaderModule::null() {
-            Vec::new()
-        } else {
-            vec![stage]
-        }
+            .name(c"main")
     }
 }
 
 impl Drop for ShaderModule {
     fn drop(&mut self) {
-        // SAFETY: pipelines outlive the modules that they are made of; the handle may be null.
+        // SAFETY: pipelines outlive the modules that they are made of.
         unsafe {
             self.device.raw().destroy_shader_module(self.handle, None);
         }

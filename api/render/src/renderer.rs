@@ -12,6 +12,7 @@ use crate::device::{Device, Purpose};
 use crate::device_scene::DeviceScene;
 use crate::draw::{DepthScale, Recorder};
 use crate::error::RenderError;
+use crate::mesh::{self, DeviceMesh, MeshPipeline};
 use crate::pipeline::{BINDINGS, GaussianPipeline};
 use crate::process_stats::processor_time;
 use crate::query::{Counter, CounterQuery};
@@ -82,7 +83,7 @@ impl Renderer {
         self.device.name()
     }
 
-    /// Copies `scene` to the device. Its colours are drawn with the spherical harmonics degree that
+    /// Copies `scene` to the device, with its triangles. Its colours are drawn with the spherical harmonics degree that
     /// it stores, or `sh_degree`, or the device's greatest, whichever is least.
     ///
     /// # Errors
@@ -107,12 +108,28 @@ impl Renderer {
             scene.sh_stride() * size_of::<[f32; 3]>(),
         ]
         .map(|stride| stride as u32);
+        let lit = mesh::lit(scene);
+        let mesh = if lit.is_empty() {
+            None
+        } else {
+            let vertices = u32::try_from(lit.len()).map_err(|_| RenderError::TooMany {
+                count: lit.len() as u64,
+                max: u32::MAX.into(),
+            })?;
+            Some(DeviceMesh {
+                vertices,
+                buffer: self.upload_bytes(bytemuck::cast_slice(&lit))?,
+                pipeline: MeshPipeline::new(&self.device)?,
+            })
+        };
+        let over_mesh = mesh.is_some();
         Ok(DeviceScene {
+            mesh,
             count: count as u32,
             strides,
             stored_degree: scene.sh_degree(),
             settings,
-            pipeline: self.pipeline(strides, scene.sh_degree(), settings)?,
+            pipeline: self.pipeline(strides, scene.sh_degree(), settings, over_mesh)?,
             buffers: [
                 self.upload_bytes(bytemuck::cast_slice(scene.positions()))?,
                 self.upload_bytes(bytemuck::cast_slice(scene.shapes()))?,
@@ -135,7 +152,8 @@ impl Renderer {
     /// # Errors
     /// If Vulkan fails.
     pub fn set(&self, scene: &mut DeviceScene, settings: Settings) -> Result<(), RenderError> {
-        scene.pipeline = self.pipeline(scene.strides, scene.stored_degree, settings)?;
+        let over_mesh = scene.mesh.is_some();
+        scene.pipeline = self.pipeline(scene.strides, scene.stored_degree, settings, over_mesh)?;
         scene.settings = settings;
         Ok(())
     }
@@ -145,12 +163,13 @@ impl Renderer {
         strides: [u32; BINDINGS],
         stored_degree: u32,
         mut settings: Settings,
+        over_mesh: bool,
     ) -> Result<GaussianPipeline, RenderError> {
         settings.sh_degree = settings
             .sh_degree
             .min(stored_degree)
             .min(self.device.max_sh_degree());
-        GaussianPipeline::new(&self.device, strides, settings, COLOR_FORMAT)
+        GaussianPipeline::new(&self.device, strides, settings, COLOR_FORMAT, over_mesh)
     }
 
     /// A device-local vertex buffer of `bytes`, copied through a staging buffer.
@@ -210,15 +229,20 @@ impl Renderer {
         let (width, height) = (camera.width, camera.height);
         check_size(&self.device, width, height)?;
         scene.settings.check(camera)?;
+        let tested = scene.mesh.is_some();
+        if tested {
+            scene.settings.check_mesh(camera)?;
+        }
         let depth = scene.settings.depth;
         let target = match self.target.take() {
             Some(target)
                 if target.image.extent() == vk::Extent2D { width, height }
-                    && target.depths.is_some() == depth =>
+                    && target.depths.is_some() == depth
+                    && target.tested.is_some() == tested =>
             {
                 target
             }
-            _ => Target::with_depths(&self.device, width, height, depth)?,
+            _ => Target::with_depths(&self.device, width, height, depth, tested)?,
         };
         let target = self.target.insert(target);
 

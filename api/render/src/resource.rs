@@ -218,12 +218,13 @@ impl Drop for Buffer {
     }
 }
 
-/// A two-dimensional colour image with its memory and a view of it.
+/// A two-dimensional image of colours or depths, with its memory and a view of it.
 pub struct Image {
     handle: vk::Image,
     memory: vk::DeviceMemory,
     view: vk::ImageView,
     extent: vk::Extent2D,
+    whole: vk::ImageSubresourceRange,
     device: Arc<Device>,
 }
 
@@ -255,6 +256,7 @@ impl Image {
             memory: vk::DeviceMemory::null(),
             view: vk::ImageView::null(),
             extent,
+            whole: whole(format),
             device: device.clone(),
         };
         // SAFETY: the image is the device's.
@@ -267,20 +269,12 @@ impl Image {
             .image(handle)
             .view_type(vk::ImageViewType::TYPE_2D)
             .format(format)
-            .subresource_range(Self::WHOLE);
+            .subresource_range(image.whole);
         // SAFETY: the structure is valid, and the image is bound to memory.
         image.view = unsafe { device.raw().create_image_view(&create_info, None) }
             .during("vkCreateImageView")?;
         Ok(image)
     }
-
-    const WHOLE: vk::ImageSubresourceRange = vk::ImageSubresourceRange {
-        aspect_mask: vk::ImageAspectFlags::COLOR,
-        base_mip_level: 0,
-        level_count: 1,
-        base_array_layer: 0,
-        layer_count: 1,
-    };
 
     /// The image's handle.
     pub fn handle(&self) -> vk::Image {
@@ -309,8 +303,21 @@ impl Image {
             .new_layout(to)
             .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
             .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
-            .subresource_range(Self::WHOLE)
+            .subresource_range(self.whole)
     }
+}
+
+/// All of an image of `format`, of one level and one layer.
+fn whole(format: vk::Format) -> vk::ImageSubresourceRange {
+    let aspect = if format == vk::Format::D32_SFLOAT {
+        vk::ImageAspectFlags::DEPTH
+    } else {
+        vk::ImageAspectFlags::COLOR
+    };
+    vk::ImageSubresourceRange::default()
+        .aspect_mask(aspect)
+        .level_count(1)
+        .layer_count(1)
 }
 
 impl Drop for Image {

@@ -64,6 +64,28 @@ impl Default for Settings {
 }
 
 impl Settings {
+    /// Checks that triangles are drawn with these modes and `camera`.
+    ///
+    /// # Errors
+    /// [`RenderError::Combination`].
+    pub fn check_mesh(&self, camera: &Camera) -> Result<(), RenderError> {
+        let refused = [
+            (
+                matches!(camera.model, Model::Fisheye | Model::Equirectangular),
+                "meshes are drawn by pinhole and orthographic cameras alone",
+            ),
+            (self.depth, "depths are not kept of scenes with meshes"),
+            (
+                camera.model == Model::Orthographic && camera.far.is_infinite(),
+                "meshes seen by an orthographic camera need a far plane",
+            ),
+        ];
+        match refused.into_iter().find(|(refused, _)| *refused) {
+            Some((_, sentence)) => Err(RenderError::Combination(sentence)),
+            None => Ok(()),
+        }
+    }
+
     /// Checks that the device can combine these modes with `camera`, and that the camera is valid.
     ///
     /// # Errors

@@ -14,6 +14,9 @@ pub const COLOR_FORMAT: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
 /// The format of the attachment of expected and median depths.
 pub(crate) const DEPTHS_FORMAT: vk::Format = vk::Format::R32G32_SFLOAT;
 
+/// The format of the attachment by which triangles hide Gaussians.
+pub(crate) const DEPTH_FORMAT: vk::Format = vk::Format::D32_SFLOAT;
+
 /// The images and buffers of a frame.
 pub struct Target {
     /// The colour attachment.
@@ -22,6 +25,8 @@ pub struct Target {
     pub readback: Buffer,
     /// The attachment of depths and its buffer, if depths are drawn.
     pub(crate) depths: Option<(Image, Buffer)>,
+    /// The depth attachment, if triangles are drawn.
+    pub(crate) tested: Option<Image>,
 }
 
 /// Checks that the device can draw a picture of this size.
@@ -42,14 +47,16 @@ impl Target {
     /// # Errors
     /// If there is no memory for it, or Vulkan fails.
     pub fn new(device: &Arc<Device>, width: u32, height: u32) -> Result<Self, RenderError> {
-        Self::with_depths(device, width, height, false)
+        Self::with_depths(device, width, height, false, false)
     }
 
+    /// A target with an attachment for the depths of pixels, or with a depth attachment for tests.
     pub(crate) fn with_depths(
         device: &Arc<Device>,
         width: u32,
         height: u32,
         depth: bool,
+        tested: bool,
     ) -> Result<Self, RenderError> {
         let extent = vk::Extent2D { width, height };
         let image = |format| {
@@ -68,6 +75,12 @@ impl Target {
             readback: readback(size_of::<[f32; 4]>())?,
             depths: if depth {
                 Some((image(DEPTHS_FORMAT)?, readback(size_of::<[f32; 2]>())?))
+            } else {
+                None
+            },
+            tested: if tested {
+                let usage = vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT;
+                Some(Image::new(device, extent, DEPTH_FORMAT, usage)?)
             } else {
                 None
             },

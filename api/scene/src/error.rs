@@ -26,8 +26,11 @@ pub enum SceneError {
         known: String,
     },
     /// The format is known, but there is no reader for it.
-    #[error("{}: {format} files are not read yet", path.display())]
-    NotReadYet {
+    #[error(
+        "{}: {format} files are not read; PlayCanvas' splat-transform converts them to .ply, which is",
+        path.display()
+    )]
+    NotRead {
         /// The file.
         path: PathBuf,
         /// The format's name.
@@ -226,9 +229,9 @@ pub enum Reason {
     /// The format is unknown; becomes [`SceneError::UnknownFormat`].
     #[error("this is not a scene file of a known kind ({0})")]
     UnknownFormat(String),
-    /// The format has no reader; becomes [`SceneError::NotReadYet`].
-    #[error("{0} files are not read yet")]
-    NotReadYet(&'static str),
+    /// The format has no reader; becomes [`SceneError::NotRead`].
+    #[error("{0} files are not read")]
+    NotRead(&'static str),
 }
 
 impl Reason {
@@ -254,7 +257,7 @@ impl Fault {
         let path = path.to_owned();
         match self.reason {
             Reason::UnknownFormat(known) => SceneError::UnknownFormat { path, known },
-            Reason::NotReadYet(format) => SceneError::NotReadYet { path, format },
+            Reason::NotRead(format) => SceneError::NotRead { path, format },
             Reason::Io(source) => SceneError::Io { path, source },
             reason => SceneError::Malformed {
                 path,

@@ -25,7 +25,7 @@ pub const DEFAULT_UP: [f64; 3] = [0.0, -1.0, 0.0];
 /// Half of the least side of the framed box, for scenes without extent or sizes.
 const LEAST: f64 = 1e-3;
 
-/// A box around the opaque parts of a scene, in the scene's units.
+/// A box around the opaque parts of a scene and its triangles, in the scene's units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Extent {
     /// The middle.
@@ -35,10 +35,18 @@ pub struct Extent {
 }
 
 impl Extent {
-    /// The box around most of `scene`'s opacity.
+    /// The box around most of `scene`'s opacity and all of its triangles.
     pub fn of(scene: &Scene) -> Self {
         let sample = sample(scene);
-        let (min, max) = bounds(sample.iter().map(|s| (s.position, s.opacity)).collect());
+        let (mut min, mut max) = bounds(sample.iter().map(|s| (s.position, s.opacity)).collect());
+        if let Some((least, greatest)) = scene.mesh().bounds() {
+            let (least, greatest) = (DVec3::from_array(least), DVec3::from_array(greatest));
+            (min, max) = if sample.is_empty() {
+                (least, greatest)
+            } else {
+                (min.min(least), max.max(greatest))
+            };
+        }
         let half = (max - min) / 2.0;
         // A scene of one point gets a box as large as its Gaussian.
         let size = typical_size(&sample);

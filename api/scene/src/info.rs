@@ -19,6 +19,8 @@ pub struct Info {
     pub gaussians: usize,
     /// The spherical harmonics degree.
     pub sh_degree: u32,
+    /// The number of triangles among the Gaussians.
+    pub triangles: usize,
     /// Its size in memory, in bytes.
     pub bytes: u64,
     /// The number of Gaussians with a number that is not finite. The device skips those whose shape or position is not
@@ -61,7 +63,9 @@ impl Info {
         let mut info = Self {
             gaussians: scene.len(),
             sh_degree: scene.sh_degree(),
+            triangles: scene.mesh().triangles(),
             bytes: (size_of_val(scene.positions())
+                + size_of_val(scene.mesh().vertices())
                 + size_of_val(scene.shapes())
                 + size_of_val(scene.sh())) as u64,
             non_finite: 0,

@@ -1,9 +1,10 @@
-//! A set of 3D Gaussians, as parallel arrays.
+//! A set of 3D Gaussians, as parallel arrays, and triangles among them.
 
 use rayon::prelude::*;
 
 use crate::error::{Fault, Place, Reason};
 use crate::harmonics::{MAX_SH_DEGREE, sh_coefficients};
+use crate::mesh::Mesh;
 use crate::metadata::{Antialiasing, Geometry, Metadata};
 use crate::shape::GaussianShape;
 use crate::transform::{Motion, Transform};
@@ -11,7 +12,7 @@ use crate::transform::{Motion, Transform};
 /// The least number of Gaussians for a thread.
 const PARALLEL: usize = 1 << 12;
 
-/// A set of 3D Gaussians, held as parallel arrays ready for upload.
+/// A set of 3D Gaussians, held as parallel arrays ready for upload, and the triangles among them.
 ///
 /// Values may be non-finite if the file has such values: the device skips and counts these Gaussians.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -20,6 +21,7 @@ pub struct Scene {
     shapes: Vec<GaussianShape>,
     sh_degree: u32,
     sh: Vec<[f32; 3]>,
+    mesh: Mesh,
     metadata: Metadata,
 }
 
@@ -38,6 +40,7 @@ impl Scene {
             shapes: Vec::with_capacity(count),
             sh_degree,
             sh: Vec::with_capacity(count.saturating_mul(sh_coefficients(sh_degree))),
+            mesh: Mesh::default(),
             metadata: Metadata::default(),
         }
     }
@@ -108,8 +111,9 @@ impl Scene {
             .for_each(make);
     }
 
-    /// Transforms every Gaussian.
+    /// Transforms every Gaussian and triangle.
     pub(crate) fn apply(&mut self, motion: &Motion) {
+        motion.apply_to_mesh(&mut self.mesh);
         let stride = self.sh_stride();
         self.positions
             .par_iter_mut()
@@ -119,7 +123,7 @@ impl Scene {
             .for_each(|((position, shape), sh)| motion.apply(position, shape, sh));
     }
 
-    /// Appends the Gaussians of `other`, transformed by `transform`. Metadata on which the two disagree are dropped,
+    /// Appends the Gaussians and triangles of `other`, transformed by `transform`. Metadata on which the two disagree are dropped,
     /// and a note says so. The spherical harmonics degree becomes the greater one.
     pub fn append(&mut self, other: &Self, transform: &Transform) {
         let mut moved = other.clone();
@@ -149,8 +153,21 @@ impl Scene {
 
     /// Appends `other` without a transform.
     fn join(&mut self, mut other: Self) {
+        self.mesh.append(std::mem::take(&mut other.mesh));
         if self.is_empty() {
+            let notes = std::mem::take(&mut self.metadata.notes);
+            other.mesh = std::mem::take(&mut self.mesh);
             *self = other;
+            for note in notes {
+                self.metadata.note(note);
+            }
+            return;
+        }
+        if other.is_empty() {
+            // Triangles alone state nothing of Gaussians.
+            for note in other.metadata.notes {
+                self.metadata.note(note);
+            }
             return;
         }
         let degree = self.sh_degree.max(other.sh_degree);
@@ -162,7 +179,7 @@ impl Scene {
         self.metadata.join(other.metadata);
     }
 
-    /// The Gaussians `range`, with the scene's metadata.
+    /// The Gaussians `range`, with the scene's metadata and without its triangles.
     pub(crate) fn range(&self, range: std::ops::Range<usize>) -> Self {
         let stride = self.sh_stride();
         Self {
@@ -170,6 +187,7 @@ impl Scene {
             shapes: self.shapes[range.clone()].to_vec(),
             sh: self.sh[range.start * stride..range.end * stride].to_vec(),
             sh_degree: self.sh_degree,
+            mesh: Mesh::default(),
             metadata: self.metadata.clone(),
         }
     }
@@ -186,6 +204,16 @@ impl Scene {
             sh.resize(sh.len() + new - old, [0.0; 3]);
         }
         (self.sh, self.sh_degree) = (sh, degree);
+    }
+
+    /// The triangles among the Gaussians.
+    pub fn mesh(&self) -> &Mesh {
+        &self.mesh
+    }
+
+    /// The triangles, for changes.
+    pub fn mesh_mut(&mut self) -> &mut Mesh {
+        &mut self.mesh
     }
 
     /// The metadata of the scene's file.

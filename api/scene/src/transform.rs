@@ -3,6 +3,7 @@
 use glam::{DMat3, DQuat, DVec3};
 
 use crate::harmonics::Turn;
+use crate::mesh::Mesh;
 use crate::shape::GaussianShape;
 
 /// The placement of a scene in another: it is scaled, then rotated, then moved.
@@ -79,6 +80,11 @@ impl Motion {
             shape,
             turn: Turn::new(&orthogonal, degree),
         }
+    }
+
+    /// Transforms triangles.
+    pub(crate) fn apply_to_mesh(&self, mesh: &mut Mesh) {
+        mesh.apply(self.linear, self.translation);
     }
 
     /// Transforms a Gaussian: its centre, its shape and its coefficients, of which the constant one is first.

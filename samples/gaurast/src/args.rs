@@ -15,7 +15,7 @@ pub const EXIT_CODES: &str = "Exit codes: 0 done, 1 it failed and one sentence o
     nothing.";
 
 #[derive(Args, Default)]
-#[command(after_help = format!("Scenes are read from {} files, as far as there is a reader; in a folder, INRIA's \
+#[command(after_help = format!("Scenes are read from {} files, and meshes from .ply, .glb and .gltf files; in a folder, INRIA's \
     output (of the highest iteration), nerfstudio's splat.ply, or the one scene file there is. \
     Their frame is that of 3DGS: x right, y down, z forward.\n\n{EXIT_CODES}", gaurast_scene::known_extensions()))]
 pub struct RenderArguments {
@@ -38,8 +38,8 @@ pub struct RenderArguments {
 /// The scene arguments.
 #[derive(Args, Clone, Debug, Default)]
 pub struct SceneArguments {
-    /// The scene: a file, a folder, or - for standard input; several are drawn together; a generated garden if there is
-    /// none
+    /// The scene: a file, a folder, or - for standard input; several, and meshes among them, are drawn together; a
+    /// generated garden if there is none
     pub scenes: Vec<PathBuf>,
 
     /// Place a scene: "scale=F turn=X,Y,Z,DEGREES move=X,Y,Z", each part optional

@@ -255,7 +255,7 @@ fn draw(arguments: &CompareArguments, size: [u32; 2]) -> Result<Picture, Error> 
         .try_into()
         .map_err(|views: Vec<View>| Error::Views(views.len()))?;
     let settings = drawing::settings(&arguments.modes, &scene);
-    let mut drawing = Drawing::new(&scene, settings, false)?;
+    let mut drawing = Drawing::new(scene, settings, false)?;
     let frame = drawing.frame(&view)?;
     let background = arguments.background.or(source.background);
     Ok(frame

@@ -128,17 +128,18 @@ pub struct Drawn {
 }
 
 impl Drawing {
-    /// Creates a device for `scene` and `settings`.
+    /// Creates a device for `scene` and `settings`. The scene's copy in host memory is freed.
     ///
     /// # Errors
     /// If there is no device, not enough memory, or too many threads are requested.
-    pub fn new(scene: &Scene, settings: Settings, counters: bool) -> Result<Self, DrawError> {
+    pub fn new(scene: Scene, settings: Settings, counters: bool) -> Result<Self, DrawError> {
         limits::check_threads().map_err(DrawError::Limit)?;
         let mut renderer = Renderer::new(vulkan_gaurast::entry())?;
         if counters {
             renderer.count_everything()?;
         }
-        let mut uploaded = renderer.upload(scene, Some(settings.sh_degree))?;
+        let mut uploaded = renderer.upload(&scene, Some(settings.sh_degree))?;
+        drop(scene);
         renderer.set(&mut uploaded, settings)?;
         Ok(Self {
             renderer,
@@ -233,6 +234,11 @@ impl Drawing {
     }
 }
 
+/// A number with four significant digits.
+fn short(number: f64) -> f64 {
+    format!("{number:.3e}").parse().unwrap_or(number)
+}
+
 /// The reason for which the picture is empty, if it is, with counts of the skipped Gaussians.
 fn reasons(frame: &Frame, view: &View) -> Option<String> {
     if frame.picture.pixels.iter().any(|pixel| pixel[3] > 0.0) {
@@ -248,8 +254,8 @@ fn reasons(frame: &Frame, view: &View) -> Option<String> {
         .filter(|counter| counter.category == "gaussians skipped" && counter.value > 0.0)
         .map(|counter| {
             let plane = match counter.name.as_str() {
-                "before near plane" => format!(" (--near {})", view.camera.near),
-                "beyond far plane" => format!(" (--far {})", view.camera.far),
+                "before near plane" => format!(" (--near {})", short(view.camera.near)),
+                "beyond far plane" => format!(" (--far {})", short(view.camera.far)),
                 _ => String::new(),
             };
             format!("{} {}{plane}", counter.value, counter.name)

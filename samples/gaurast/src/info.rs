@@ -75,6 +75,9 @@ fn text(info: &Info, extent: &Extent) -> String {
     };
     line("Gaussians", &grouped(info.gaussians as f64));
     line("SH degree", &info.sh_degree.to_string());
+    if info.triangles > 0 {
+        line("triangles", &grouped(info.triangles as f64));
+    }
     let mebibytes = info.bytes as f64 / f64::from(1 << 20);
     line("memory", &format!("{mebibytes:.1} MiB"));
     if info.non_finite > 0 {

@@ -14,7 +14,7 @@ use crate::heatmap::{self, HeatmapError};
 use crate::limits;
 use crate::outputs::{Outputs, WriteError};
 use crate::progress::Progress;
-use crate::report::{self, Summary};
+use crate::report::{self, Contents, Summary};
 use crate::sources::{Source, SourceError};
 
 /// A failure of the command. Displayed as one sentence.
@@ -81,6 +81,11 @@ pub fn run(arguments: &RenderArguments) -> Result<(), Error> {
     settings.depth = arguments.output.depth;
     for view in &views {
         settings.check(&view.camera).map_err(DrawError::Render)?;
+        if !scene.mesh().is_empty() {
+            settings
+                .check_mesh(&view.camera)
+                .map_err(DrawError::Render)?;
+        }
     }
     let indices = chosen(&views, arguments, &outputs)?;
     let largest = indices.iter().map(|index| &views[*index].camera);
@@ -93,12 +98,13 @@ pub fn run(arguments: &RenderArguments) -> Result<(), Error> {
         return Err(Error::HeatmapViews(indices.len()));
     }
 
+    let contents = Contents::of(&scene);
     let start = Instant::now();
     let drawn = if indices.is_empty() {
         Vec::new()
     } else {
         let step = progress.step("uploading");
-        let mut drawing = Drawing::new(&scene, settings, arguments.report.counters)?;
+        let mut drawing = Drawing::new(scene, settings, arguments.report.counters)?;
         step.finish_and_clear();
         drawing.all(
             &views,
@@ -117,7 +123,7 @@ pub fn run(arguments: &RenderArguments) -> Result<(), Error> {
         _ => None,
     };
     let summary = Summary {
-        scene: &scene,
+        contents,
         files: &arguments.scene.scenes,
         loading,
         drawing: start.elapsed(),

@@ -15,9 +15,28 @@ use crate::cameras::View;
 use crate::drawing::Drawn;
 use crate::outputs::Outputs;
 
+/// The contents of a scene, in numbers.
+#[derive(Clone, Copy)]
+pub struct Contents {
+    gaussians: usize,
+    sh_degree: u32,
+    triangles: usize,
+}
+
+impl Contents {
+    /// The contents of `scene`.
+    pub fn of(scene: &Scene) -> Self {
+        Self {
+            gaussians: scene.len(),
+            sh_degree: scene.sh_degree(),
+            triangles: scene.mesh().triangles(),
+        }
+    }
+}
+
 /// The results of a rendering.
 pub struct Summary<'a> {
-    pub scene: &'a Scene,
+    pub contents: Contents,
     /// The scene's files; the garden if there is none.
     pub files: &'a [PathBuf],
     pub loading: Duration,
@@ -73,10 +92,15 @@ impl Summary<'_> {
         let places = self.outputs.told(view(first), view(last));
         let camera = &self.views[first.index].camera;
         let size = format!("{}x{}", camera.width, camera.height);
-        let gaussians = match self.scene.len() {
-            1 => "1 Gaussian".to_owned(),
-            count => format!("{} Gaussians", grouped(count as f64)),
+        let counted = |count: usize, name: &str| match count {
+            1 => format!("1 {name}"),
+            count => format!("{} {name}s", grouped(count as f64)),
         };
+        let mut contents = counted(self.contents.gaussians, "Gaussian");
+        match self.contents.triangles {
+            0 => {}
+            triangles => contents += &format!(" and {}", counted(triangles, "triangle")),
+        }
         let time = if self.drawn.len() == 1 {
             format!("drawn in {}", duration(first.time))
         } else {
@@ -87,7 +111,7 @@ impl Summary<'_> {
             )
         };
         format!(
-            "wrote {places}: {size}, {gaussians} read in {}, {time}{kept}",
+            "wrote {places}: {size}, {contents} read in {}, {time}{kept}",
             duration(self.loading)
         )
     }
@@ -112,8 +136,12 @@ impl Summary<'_> {
             "size",
             format!("{} x {}", camera.width, camera.height),
         );
-        row("scene", "Gaussians", grouped(self.scene.len() as f64));
-        row("scene", "SH degree", self.scene.sh_degree().to_string());
+        row(
+            "scene",
+            "Gaussians",
+            grouped(self.contents.gaussians as f64),
+        );
+        row("scene", "SH degree", self.contents.sh_degree.to_string());
         for counter in drawn.counters.iter().filter(|counter| counter.value != 0.0) {
             row(&counter.category, &counter.name, value(counter));
         }
@@ -156,8 +184,9 @@ impl Summary<'_> {
             .collect();
         json!({
             "scenes": self.files,
-            "gaussians": self.scene.len(),
-            "sh_degree": self.scene.sh_degree(),
+            "gaussians": self.contents.gaussians,
+            "sh_degree": self.contents.sh_degree,
+            "triangles": self.contents.triangles,
             "load_milliseconds": milliseconds(self.loading),
             "milliseconds": milliseconds(self.drawing),
             "kept": self.kept,

@@ -13,11 +13,19 @@ use crate::progress::Progress;
 /// The generated garden's seed.
 const SEED: u64 = 1;
 
+/// The name of outputs if the scene has none.
+const DEFAULT_NAME: &str = "gaurast";
+
+/// The most scenes of a folder that a message names.
+const NAMED: usize = 4;
+
 /// A failure to read the scene. Displayed as one sentence.
 #[derive(Debug, Error)]
 pub enum SourceError {
     #[error(transparent)]
     Scene(#[from] SceneError),
+    #[error("{}: the folder holds several scenes, of which one must be named: {names}", path.display())]
+    Several { path: PathBuf, names: String },
     #[error("{}: {source}", path.display())]
     Io {
         path: PathBuf,
@@ -76,7 +84,7 @@ impl Source {
             });
         }
         let mut source = Self {
-            name: "gaurast".to_owned(),
+            name: DEFAULT_NAME.to_owned(),
             level: arguments.level,
             ..Self::default()
         };
@@ -126,7 +134,8 @@ impl Source {
                 bar.wrap_read(file)
             })?;
             bar.finish_and_clear();
-            if scene.is_empty() && *transform == Transform::default() {
+            let first = scene.is_empty() && scene.mesh().is_empty();
+            if first && *transform == Transform::default() {
                 scene = part;
             } else {
                 scene.append(&part, transform);
@@ -151,8 +160,14 @@ fn part(path: &Path) -> Result<Part, SourceError> {
     if path.is_dir() {
         return folder(path);
     }
+    // Standard input has no name.
+    let name = if path == Path::new("-") {
+        DEFAULT_NAME.to_owned()
+    } else {
+        stem(path)
+    };
     Ok(Part {
-        name: stem(path),
+        name,
         file: path.to_owned(),
         dataparser: beside(path, "dataparser_transforms.json"),
         ..Part::default()
@@ -164,7 +179,7 @@ pub fn stem(path: &Path) -> String {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let stem = name.split('.').next().unwrap_or_default();
     if stem.is_empty() {
-        "gaurast".to_owned()
+        DEFAULT_NAME.to_owned()
     } else {
         stem.to_owned()
     }
@@ -180,7 +195,7 @@ fn folder(path: &Path) -> Result<Part, SourceError> {
         source,
     };
     let whole = path.canonicalize().map_err(io)?;
-    let name = whole.file_name().map_or("gaurast".to_owned(), |name| {
+    let name = whole.file_name().map_or(DEFAULT_NAME.to_owned(), |name| {
         name.to_string_lossy().into_owned()
     });
     let there = |name: &str| Some(path.join(name)).filter(|path| path.is_file());
@@ -202,7 +217,7 @@ fn folder(path: &Path) -> Result<Part, SourceError> {
         // A SOG scene of several files.
         path.to_owned()
     } else {
-        (only_scene(path).map_err(io)?).ok_or_else(|| why_none(path))?
+        only_scene(path)?
     };
     if let Some(arguments) = there("cfg_args")
         && let Ok(text) = std::fs::read_to_string(arguments)
@@ -228,8 +243,8 @@ fn newest_iteration(folder: &Path) -> Option<(u64, PathBuf)> {
         .max_by_key(|(iteration, _)| *iteration)
 }
 
-/// The only scene file in `folder`, or `None` if there are none or several.
-fn only_scene(folder: &Path) -> std::io::Result<Option<PathBuf>> {
+/// The scene files in `folder`, by name.
+fn scenes(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
     let known = gaurast_scene::known_extensions();
     let mut found = Vec::new();
     for entry in folder.read_dir()? {
@@ -243,7 +258,34 @@ fn only_scene(folder: &Path) -> std::io::Result<Option<PathBuf>> {
             found.push(path);
         }
     }
-    Ok(if found.len() == 1 { found.pop() } else { None })
+    found.sort();
+    Ok(found)
+}
+
+/// The only scene file in `folder`.
+fn only_scene(folder: &Path) -> Result<PathBuf, SourceError> {
+    let path = || folder.to_owned();
+    let mut found = scenes(folder).map_err(|source| SourceError::Io {
+        path: path(),
+        source,
+    })?;
+    if found.len() < 2 {
+        return found.pop().ok_or_else(|| why_none(folder));
+    }
+    let name = |file: &PathBuf| {
+        file.file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned()
+    };
+    let mut names: Vec<String> = found.iter().take(NAMED).map(name).collect();
+    if found.len() > NAMED {
+        names.push(format!("and {} more", found.len() - NAMED));
+    }
+    Err(SourceError::Several {
+        path: path(),
+        names: names.join(", "),
+    })
 }
 
 fn why_none(path: &Path) -> SourceError {
@@ -317,7 +359,11 @@ mod tests {
         touch(folder.path(), "a.ply", "");
         assert!(of(folder.path()).is_ok());
         touch(folder.path(), "b.spz", "");
-        assert!(of(folder.path()).is_err());
+        assert!(
+            refused().contains("one must be named: a.ply, b.spz"),
+            "{}",
+            refused()
+        );
         touch(folder.path(), "splat.ply", "");
         let source = of(folder.path()).expect("nerfstudio's");
         assert!(source.files[0].0.ends_with("splat.ply"));

@@ -34,6 +34,11 @@ pub(super) trait Format: Sync {
         None
     }
 
+    /// Returns true if there is a reader of this format.
+    fn is_read(&self) -> bool {
+        true
+    }
+
     /// Reads a whole scene.
     ///
     /// # Errors

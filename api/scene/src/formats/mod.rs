@@ -132,8 +132,12 @@ impl Format for NotRead {
         self.extensions
     }
 
+    fn is_read(&self) -> bool {
+        false
+    }
+
     fn load(&self, _: &mut Input<'_>) -> Result<Scene, Fault> {
-        Err(Reason::NotReadYet(self.name).at(Place::File))
+        Err(Reason::NotRead(self.name).at(Place::File))
     }
 }
 
@@ -161,10 +165,11 @@ fn choose(path: &Path, start: &[u8]) -> Option<&'static dyn Format> {
     by_extension.or_else(by_magic).copied()
 }
 
-/// The extensions of all known formats, for messages.
+/// The extensions of all formats with a reader, for messages.
 pub fn known_extensions() -> String {
     FORMATS
         .iter()
+        .filter(|format| format.is_read())
         .flat_map(|format| format.extensions())
         .map(|extension| format!(".{extension}"))
         .collect::<Vec<_>>()

@@ -353,7 +353,7 @@ fn what_gltf_says_is_told_or_refused() {
     let (place, reason) = file.refusal();
     assert_eq!(place, Place::Part(format!("mesh 0, primitive 0, {name}")));
     assert!(matches!(reason, Reason::Missing));
-    // Meshes of triangles are ignored, and a file with nothing else is refused.
+    // Lines are ignored, and a file with nothing else is refused.
     let mut file = Builder::new();
     file.primitive()["extensions"] = json!({});
     assert!(matches!(file.refusal().1, Reason::Unsupported(_)));
@@ -361,7 +361,7 @@ fn what_gltf_says_is_told_or_refused() {
     let primitives = file.document["meshes"][0]["primitives"]
         .as_array_mut()
         .expect("primitives");
-    primitives.push(json!({"attributes": {"POSITION": 0}}));
+    primitives.push(json!({"mode": 1, "attributes": {"POSITION": 0}}));
     assert_eq!(file.load().metadata().notes.len(), 1);
 }
 

@@ -2,6 +2,7 @@
 
 mod gltf;
 mod ksplat;
+mod meshes;
 mod metadata;
 mod ply;
 mod scenes;
@@ -92,11 +93,14 @@ fn real_scenes_are_read(case: &Case) {
 #[gaurast_runner::test]
 fn formats_that_are_not_read_and_unknown_ones_are_named() {
     let not_read = |name: &str, bytes: &[u8]| match read(name, bytes) {
-        Err(SceneError::NotReadYet { format, .. }) => format,
+        Err(SceneError::NotRead { format, .. }) => format,
         other => panic!("{name}: {other:?}"),
     };
     assert_eq!(not_read("a.lcc", b"{}"), "LCC");
     assert_eq!(not_read("A.LCC2", b"{}"), "LCC");
+    let error = read("a.lcc", b"{}").expect_err("no reader").to_string();
+    assert!(error.contains("splat-transform converts them"), "{error}");
+    assert!(!gaurast_scene::known_extensions().contains("lcc"));
     let error = read("a.txt", b"hello").expect_err("unknown");
     assert!(matches!(error, SceneError::UnknownFormat { .. }));
     assert!(error.to_string().contains(".splat"), "{error}");
@@ -132,6 +136,8 @@ fn good_files() -> Vec<(&'static str, Vec<u8>)> {
         ("1.sog", sog::archive(1)),
         ("a.glb", gltf::glb()),
         ("a.gltf", gltf::gltf()),
+        ("mesh.ply", meshes::binary(false)),
+        ("mesh.glb", meshes::glb()),
     ]
 }
 
@@ -198,7 +204,7 @@ proptest! {
     /// Tests that no change of bytes makes a reader panic, or use more memory than the file could need.
     #[gaurast_runner::test]
     fn flipped_bytes_never_panic(
-        which in 0_usize..15,
+        which in 0..GOOD_FILES.len(),
         flips in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6),
     ) {
         let (name, mut file) = GOOD_FILES[which].clone();

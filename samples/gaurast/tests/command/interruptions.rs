@@ -88,6 +88,51 @@ fn an_interrupted_render_leaves_the_picture_that_was_there() {
     assert!(interrupted > 0);
 }
 
+#[gaurast_runner::test]
+fn a_killed_run_goes_on() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let run = |place: &'static str| {
+        [
+            "render", "-q", "--orbit", "12", "--size", "320x240", "--resume", "-o", place,
+        ]
+    };
+    let whole = gaurast(&folder, &run("whole/")).status();
+    assert!(whole.expect("it starts").success());
+    let picture = |place: &str, index: u32| folder.path().join(format!("{place}/{index:05}.png"));
+    // It is killed once the third picture is there.
+    let mut child = gaurast(&folder, &run("parts/")).spawn().expect("it starts");
+    while !picture("parts", 2).is_file() {
+        assert!(
+            child.try_wait().expect("its status").is_none(),
+            "it is still drawing"
+        );
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    child.kill().expect("killed");
+    child.wait().expect("its status");
+    let there = |index: &u32| picture("parts", *index).is_file();
+    let before = (0..12).filter(there).count();
+    assert!(
+        (3..12).contains(&before),
+        "{before} pictures before it was killed"
+    );
+    let changed = |index: u32| {
+        picture("parts", index)
+            .metadata()
+            .and_then(|file| file.modified())
+    };
+    let first = changed(0).expect("a time");
+    let again = gaurast(&folder, &run("parts/")).status();
+    assert!(again.expect("it starts").success());
+    assert_eq!(changed(0).expect("a time"), first, "it is not drawn again");
+    for index in 0..12 {
+        assert!(
+            read(&picture("parts", index)) == read(&picture("whole", index)),
+            "{index}"
+        );
+    }
+}
+
 #[gaurast_runner::test(needs = [gaurast_runner::Need::File("/dev/full")])]
 fn a_full_disk_is_one_sentence() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -322,6 +322,41 @@ fn an_orbit_is_numbered_shared_and_goes_on() {
 }
 
 #[gaurast_runner::test]
+fn eight_shares_are_one_run() {
+    let folder = folder();
+    let run = |place: &str, more: &[&str]| {
+        let orbit = [
+            "two.ply", "-q", "--orbit", "11", "--size", "40x30", "-o", place,
+        ];
+        succeeds(&folder, &[&orbit[..], more].concat());
+    };
+    run("whole/", &[]);
+    for share in 0..8 {
+        run("shared/", &["--shard", &format!("{share}/8")]);
+    }
+    let read = |place: &str| -> Vec<(std::ffi::OsString, Vec<u8>)> {
+        let entries = std::fs::read_dir(folder.path().join(place)).expect("a folder");
+        let file = |entry: std::io::Result<std::fs::DirEntry>| {
+            let entry = entry.expect("an entry");
+            (
+                entry.file_name(),
+                std::fs::read(entry.path()).expect("readable"),
+            )
+        };
+        let mut files: Vec<_> = entries.map(file).collect();
+        files.sort();
+        files
+    };
+    let whole = read("whole");
+    assert_eq!(whole.len(), 11);
+    assert!(
+        whole.windows(2).all(|pair| pair[0].1 != pair[1].1),
+        "views differ"
+    );
+    assert!(read("shared") == whole);
+}
+
+#[gaurast_runner::test]
 fn formats_hold_the_same_picture() {
     let folder = folder();
     let fixed = [
@@ -427,6 +462,19 @@ fn standard_output_takes_frames() {
     );
     assert!(png.stdout.starts_with(b"\x89PNG") && png.stderr.is_empty());
     assert_eq!(files(&folder), ["two.ply"]);
+    // The picture of a scene from standard input is not called "-".
+    let mut child = Command::new(env!("CARGO_BIN_EXE_gaurast"))
+        .args(["-", "--size", "16x8", "-q"])
+        .current_dir(&folder)
+        .stdin(std::process::Stdio::piped())
+        .spawn()
+        .expect("it starts");
+    let bytes = std::fs::read(folder.path().join("two.ply")).expect("readable");
+    let mut input = child.stdin.take().expect("an input");
+    std::io::Write::write_all(&mut input, &bytes).expect("written");
+    drop(input);
+    assert!(child.wait().expect("it ends").success());
+    assert_eq!(files(&folder), ["gaurast.png", "two.ply"]);
 }
 
 #[cfg(unix)]
@@ -746,4 +794,61 @@ fn scenes_are_put_together() {
         text.contains("Gaussians   1") && text.contains("from 0.9"),
         "{text}"
     );
+}
+
+#[gaurast_runner::test]
+fn a_mesh_hides_what_is_behind_it() {
+    let folder = folder();
+    // A blue wall between red, in front, and green.
+    let wall = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+        property uchar red\nproperty uchar green\nproperty uchar blue\nelement face 1\n\
+        property list uchar int vertex_indices\nend_header\n\
+        -3 -3 0 0 0 255\n3 -3 0 0 0 255\n3 3 0 0 0 255\n-3 3 0 0 0 255\n4 0 1 2 3\n";
+    std::fs::write(folder.path().join("wall.ply"), wall).expect("written");
+    let mean = |more: &[&str]| {
+        let fixed = [
+            "two.ply",
+            "wall.ply",
+            "--elevation",
+            "0",
+            "--size",
+            "64x48",
+            "--force",
+            "-o",
+            "a.png",
+        ];
+        let stdout = succeeds(&folder, &[&fixed[..], more].concat());
+        assert!(
+            stdout.contains("2 Gaussians and 2 triangles read"),
+            "{stdout}"
+        );
+        covered(&folder, "a.png").1
+    };
+    for camera in [&[][..], &["--camera", "orthographic"], &["--far", "99"]] {
+        let [r, g, b] = mean(&[&["--azimuth", "0"], camera].concat());
+        assert!(r > 1.0 && g == 0.0 && b > 20.0, "{camera:?}: {r} {g} {b}");
+        let [r, g, b] = mean(&[&["--azimuth", "180"], camera].concat());
+        assert!(r == 0.0 && g > 1.0 && b > 20.0, "{camera:?}: {r} {g} {b}");
+    }
+    // A mesh alone is a scene.
+    succeeds(&folder, &["wall.ply", "--azimuth", "0", "--size", "64x48"]);
+    assert!(covered(&folder, "wall.png").0 > 0.4);
+    let text = succeeds(&folder, &["info", "two.ply", "wall.ply"]);
+    assert!(text.contains("triangles   2\n"), "{text}");
+    for (modes, sentence) in [
+        (
+            &["--camera", "fisheye", "-o", "b.png"][..],
+            "pinhole and orthographic",
+        ),
+        (
+            &["--depth", "-o", "b.exr"],
+            "depths are not kept of scenes with meshes",
+        ),
+    ] {
+        fails(
+            &folder,
+            &[&["two.ply", "wall.ply"], modes].concat(),
+            sentence,
+        );
+    }
 }

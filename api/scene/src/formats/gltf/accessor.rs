@@ -1,4 +1,4 @@
-//! Accessors: attributes of vertices as floats.
+//! Accessors: attributes of vertices as floats, and indices.
 
 use super::buffers::Buffers;
 use crate::error::{Fault, Place, Reason};
@@ -14,6 +14,7 @@ pub(super) const BYTE: u32 = 5120;
 pub(super) const UNSIGNED_BYTE: u32 = 5121;
 pub(super) const SHORT: u32 = 5122;
 pub(super) const UNSIGNED_SHORT: u32 = 5123;
+pub(super) const UNSIGNED_INT: u32 = 5125;
 pub(super) const FLOAT: u32 = 5126;
 
 impl Component {
@@ -68,7 +69,7 @@ impl Component {
             UNSIGNED_BYTE => "unsigned byte",
             SHORT => "signed short",
             UNSIGNED_SHORT => "unsigned short",
-            5125 => "unsigned int",
+            UNSIGNED_INT => "unsigned int",
             FLOAT => "float",
             _ => return format!("{}", self.kind),
         };
@@ -97,6 +98,45 @@ pub(super) fn values(
     demand: &Demand,
     place: &str,
 ) -> Result<Vec<f32>, Fault> {
+    decoded(buffers, index, demand, place, Component::decode)
+}
+
+/// The indices of accessor `index`. Messages name it `place`.
+pub(super) fn indices(
+    buffers: &mut Buffers<'_>,
+    index: usize,
+    place: &str,
+) -> Result<Vec<u32>, Fault> {
+    const INDEX: Demand = Demand {
+        width: 1,
+        components: &[
+            Component::plain(UNSIGNED_BYTE),
+            Component::plain(UNSIGNED_SHORT),
+            Component::plain(UNSIGNED_INT),
+        ],
+        expected: "unsigned byte, short or int",
+    };
+    decoded(
+        buffers,
+        index,
+        &INDEX,
+        place,
+        |component, bytes| match component.size() {
+            1 => bytes[0].into(),
+            2 => u16::from_le_bytes([bytes[0], bytes[1]]).into(),
+            _ => u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]),
+        },
+    )
+}
+
+/// The components of accessor `index`, element after element, each decoded by `decode` from the bytes that it begins.
+fn decoded<T>(
+    buffers: &mut Buffers<'_>,
+    index: usize,
+    demand: &Demand,
+    place: &str,
+    decode: impl Fn(Component, &[u8]) -> T,
+) -> Result<Vec<T>, Fault> {
     let at = |reason: Reason| reason.at(Place::Part(place.to_owned()));
     let document = buffers.document;
     let accessor = document
@@ -149,7 +189,7 @@ pub(super) fn values(
         .map_err(|_| at(Reason::Memory(4 * len as u64)))?;
     for element in bytes.chunks(stride).take(accessor.count) {
         for c in 0..demand.width {
-            values.push(component.decode(&element[c * component.size()..]));
+            values.push(decode(component, &element[c * component.size()..]));
         }
     }
     Ok(values)

@@ -45,6 +45,8 @@ pub(super) struct Document {
     #[serde(default)]
     pub(super) meshes: Vec<Mesh>,
     #[serde(default)]
+    pub(super) materials: Vec<Material>,
+    #[serde(default)]
     pub(super) accessors: Vec<Accessor>,
     #[serde(default)]
     pub(super) buffer_views: Vec<BufferView>,
@@ -87,8 +89,26 @@ pub(super) struct Mesh {
 pub(super) struct Primitive {
     pub(super) attributes: HashMap<String, usize>,
     pub(super) mode: Option<u32>,
+    pub(super) indices: Option<usize>,
+    pub(super) material: Option<usize>,
     #[serde(default)]
     pub(super) extensions: HashMap<String, serde_json::Value>,
+}
+
+/// The surface of triangles.
+#[derive(Default, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Material {
+    #[serde(default)]
+    pub(super) pbr_metallic_roughness: Surface,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Surface {
+    /// Linear red, green and blue, and alpha.
+    pub(super) base_color_factor: Option<[f32; 4]>,
+    pub(super) base_color_texture: Option<IgnoredAny>,
 }
 
 #[derive(Deserialize)]

@@ -1,6 +1,6 @@
 //! glTF 2.0 with `KHR_gaussian_splatting`, as JSON (`.gltf`) and as a binary file (`.glb`).
 //!
-//! Every primitive with the extension becomes Gaussians, transformed by its node. The frame, right-up-back, is rotated
+//! Every primitive with the extension becomes Gaussians, and every one of triangles a mesh, transformed by its node. The frame, right-up-back, is rotated
 //! half a turn around x. Draft extensions that store a primitive's Gaussians as SPZ are read, and a note names them as
 //! drafts.
 
@@ -8,6 +8,7 @@ mod accessor;
 mod buffers;
 mod document;
 mod primitive;
+mod triangles;
 
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 
@@ -115,6 +116,7 @@ fn load(json: &[u8], binary: Option<&[u8]>, origin: Origin<'_>) -> Result<Scene,
         scene: Scene::default(),
         visited: vec![false; document.nodes.len()],
         other_primitives: 0,
+        has_textures: false,
     };
     let to_scene = DAffine3::from_mat3(DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0)));
     for root in document.roots()? {
@@ -123,16 +125,22 @@ fn load(json: &[u8], binary: Option<&[u8]>, origin: Origin<'_>) -> Result<Scene,
     let Reader {
         mut scene,
         other_primitives,
+        has_textures,
         ..
     } = reader;
-    if scene.is_empty() {
-        let text = "no node of its scene has Gaussians (KHR_gaussian_splatting)";
+    if scene.is_empty() && scene.mesh().is_empty() {
+        let text = "no node of its scene has Gaussians (KHR_gaussian_splatting) or triangles";
         return Err(Reason::Unsupported(text.to_owned()).at(Place::File));
     }
     if other_primitives > 0 {
         scene.metadata_mut().note(format!(
-            "what are no Gaussians is ignored: {other_primitives} primitives"
+            "what are neither Gaussians nor triangles is ignored: {other_primitives} primitives"
         ));
+    }
+    if has_textures {
+        scene
+            .metadata_mut()
+            .note("textures of meshes are ignored, and their materials' colours are taken");
     }
     if !document.animations.is_empty() {
         scene.metadata_mut().note("animations are ignored");
@@ -148,6 +156,8 @@ struct Reader<'a> {
     /// True for each node that has been visited; each is in a tree once.
     visited: Vec<bool>,
     other_primitives: usize,
+    /// True if triangles have a texture.
+    has_textures: bool,
 }
 
 /// The affine map of `node`.
@@ -168,7 +178,7 @@ fn local(node: &Node) -> DAffine3 {
 }
 
 impl Reader<'_> {
-    /// Reads the Gaussians of node `root` and its descendants, transformed by `above` and by their nodes.
+    /// Reads the Gaussians and triangles of node `root` and its descendants, transformed by `above` and by their nodes.
     fn visit(&mut self, root: usize, above: DAffine3) -> Result<(), Fault> {
         let mut stack = vec![(root, above)];
         while let Some((index, above)) = stack.pop() {
@@ -196,7 +206,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Reads the Gaussians of mesh `index`, transformed by `map`.
+    /// Reads the Gaussians and triangles of mesh `index`, transformed by `map`.
     fn mesh(&mut self, index: usize, map: &DAffine3) -> Result<(), Fault> {
         let document = self.document;
         let mesh = document
@@ -205,11 +215,18 @@ impl Reader<'_> {
             .ok_or_else(|| Reason::Missing.at(Place::Part(format!("mesh {index}"))))?;
         for (number, primitive) in mesh.primitives.iter().enumerate() {
             let place = format!("mesh {index}, primitive {number}");
-            let Some(mut scene) = primitive::gaussians(&mut self.buffers, primitive, &place)?
-            else {
-                self.other_primitives += 1;
-                continue;
-            };
+            let mut scene =
+                if let Some(scene) = primitive::gaussians(&mut self.buffers, primitive, &place)? {
+                    scene
+                } else if let Some(mesh) = triangles::mesh(&mut self.buffers, primitive, &place)? {
+                    self.has_textures |= triangles::has_texture(document, primitive);
+                    let mut scene = Scene::default();
+                    *scene.mesh_mut() = mesh;
+                    scene
+                } else {
+                    self.other_primitives += 1;
+                    continue;
+                };
             scene.apply(&Motion::new(
                 map.matrix3,
                 map.translation,

@@ -40,7 +40,8 @@ struct Compressed {
     buffer_view: usize,
 }
 
-const POSITION: Demand = Demand {
+/// Positions, of Gaussians and of triangles.
+pub(super) const POSITION: Demand = Demand {
     width: 3,
     components: &[
         Component::plain(FLOAT),

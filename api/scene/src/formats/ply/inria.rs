@@ -11,7 +11,8 @@ use crate::metadata::Geometry;
 use crate::scene::Scene;
 use crate::shape::{GaussianShape, sigmoid};
 
-const VERTEX: &str = "vertex";
+/// The element of Gaussians, and of the vertices of a mesh.
+pub(super) const VERTEX: &str = "vertex";
 
 /// The properties that every file has; `gaussian` unpacks them in this order.
 const REQUIRED: [&str; 13] = [

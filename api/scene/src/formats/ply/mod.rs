@@ -1,8 +1,9 @@
-//! PLY files: the layout of the original 3DGS code, and PlayCanvas's compressed one.
+//! PLY files: the layout of the original 3DGS code, PlayCanvas's compressed one, and meshes.
 
 mod comments;
 mod compressed;
 mod inria;
+mod mesh;
 mod table;
 
 use super::input::{Format, Input};
@@ -30,6 +31,8 @@ impl Format for Ply {
         let said = comments::metadata(table.comments());
         let mut scene = if table.element("chunk").is_some() {
             compressed::load(table)?
+        } else if mesh::is_one(&table) {
+            return mesh::load(table);
         } else {
             inria::load(table)?
         };

@@ -41,6 +41,26 @@ pub(super) struct Column {
     kind: ScalarType,
 }
 
+impl Column {
+    /// Returns true if the numbers are floats.
+    pub(super) fn is_float(&self) -> bool {
+        matches!(self.kind, ScalarType::Float | ScalarType::Double)
+    }
+
+    /// The greatest value of the column's type, if it is an integer.
+    pub(super) fn max(&self) -> f64 {
+        match self.kind {
+            ScalarType::Char => i8::MAX.into(),
+            ScalarType::UChar => u8::MAX.into(),
+            ScalarType::Short => i16::MAX.into(),
+            ScalarType::UShort => u16::MAX.into(),
+            ScalarType::Int => i32::MAX.into(),
+            ScalarType::UInt => u32::MAX.into(),
+            ScalarType::Float | ScalarType::Double => f64::MAX,
+        }
+    }
+}
+
 impl<'i, 'a> Table<'i, 'a> {
     /// Reads the header and checks that the file is large enough for it.
     pub(super) fn open(input: &'i mut Input<'a>) -> Result<Self, Fault> {
@@ -211,6 +231,75 @@ impl<'i, 'a> Table<'i, 'a> {
         self.read_element(index, columns, &mut each)
     }
 
+    /// Reads element `name`, the next one of the file: calls `each` with the values of a row's list `property`. Other
+    /// properties are skipped.
+    pub(super) fn read_lists(
+        &mut self,
+        name: &str,
+        property: &str,
+        mut each: impl FnMut(&[u32]),
+    ) -> Result<(), Fault> {
+        let place = || Place::Property {
+            element: name.to_owned(),
+            property: property.to_owned(),
+        };
+        let index = (self.header.elements.get_index_of(name))
+            .filter(|index| *index >= self.next)
+            .ok_or_else(|| Reason::Missing.at(Place::Element(name.to_owned())))?;
+        for passed in self.next..index {
+            self.read_element(passed, &[], &mut |_| {})?;
+        }
+        self.next = index + 1;
+        let element = self.header.elements[index].clone();
+        match element
+            .properties
+            .get(property)
+            .map(|found| &found.data_type)
+        {
+            Some(PropertyType::List(..)) => {}
+            Some(PropertyType::Scalar(_)) => {
+                let (found, expected) = ("a number".to_owned(), "a list");
+                return Err(Reason::Type { found, expected }.at(place()));
+            }
+            None => return Err(Reason::Missing.at(place())),
+        }
+        let big_endian = match self.header.encoding {
+            Encoding::Ascii => None,
+            Encoding::BinaryLittleEndian => Some(false),
+            Encoding::BinaryBigEndian => Some(true),
+        };
+        let (mut line, mut list) = (Vec::new(), Vec::new());
+        for _ in 0..element.count {
+            let mut numbers = match big_endian {
+                None => {
+                    self.lines += 1;
+                    line.clear();
+                    self.input.line(&mut line, MAX_LINE)?;
+                    Numbers::Text(line.split(u8::is_ascii_whitespace), self.lines)
+                }
+                Some(big_endian) => Numbers::Binary(self.input, big_endian),
+            };
+            for found in element.properties.values() {
+                let (kind, count) = match &found.data_type {
+                    PropertyType::Scalar(kind) => (kind, 1),
+                    PropertyType::List(count, kind) => (kind, numbers.next(count)? as u64),
+                };
+                list.clear();
+                for _ in 0..count {
+                    let value = numbers.next(kind)?;
+                    if found.name == property {
+                        // A negative index is out of range, as the greatest one is.
+                        list.push(if value < 0.0 { u32::MAX } else { value as u32 });
+                    }
+                }
+                if found.name == property {
+                    each(&list);
+                }
+            }
+        }
+        Ok(())
+    }
+
     fn read_element(
         &mut self,
         index: usize,
@@ -293,6 +382,44 @@ impl<'i, 'a> Table<'i, 'a> {
             });
         }
         Ok(())
+    }
+}
+
+/// The numbers of a row, one after the other.
+enum Numbers<'r, 'a, P: FnMut(&u8) -> bool> {
+    /// The words of a line, and its number.
+    Text(std::slice::Split<'r, u8, P>, u64),
+    /// The payload, and true if it is big-endian.
+    Binary(&'r mut Input<'a>, bool),
+}
+
+impl<P: FnMut(&u8) -> bool> Numbers<'_, '_, P> {
+    /// The next number, of type `kind`.
+    fn next(&mut self, kind: &ScalarType) -> Result<f64, Fault> {
+        match self {
+            Self::Text(words, line) => {
+                let word = words.find(|word| !word.is_empty());
+                let word = word.ok_or_else(|| Reason::Truncated.at(Place::Line(*line)))?;
+                let word = String::from_utf8_lossy(word);
+                text_number(kind, &word)
+                    .ok_or_else(|| Reason::Number(word.into_owned()).at(Place::Line(*line)))
+            }
+            Self::Binary(input, big_endian) => {
+                let mut bytes = [0; 8];
+                let bytes = &mut bytes[..size(kind)];
+                input.fill(bytes)?;
+                let column = Column {
+                    index: 0,
+                    offset: 0,
+                    kind: kind.clone(),
+                };
+                Ok(if *big_endian {
+                    number::<true>(&column, bytes)
+                } else {
+                    number::<false>(&column, bytes)
+                })
+            }
+        }
     }
 }
 

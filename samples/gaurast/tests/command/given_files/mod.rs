@@ -3,6 +3,7 @@
 
 mod cameras;
 mod fixtures;
+mod golden;
 
 use std::ffi::OsStr;
 use std::path::Path;
