@@ -40,6 +40,8 @@ module pe #(
     // At GAUSSIAN: the new colour.
     output logic [3*(1+EXPONENT+MANTISSA)-1:0] next_color
 );
+    // Verilator compiles this module once for all of its instances.
+    /* verilator hier_block */
     `include "latencies.svh"
     localparam int BITS = 1 + EXPONENT + MANTISSA;
     localparam logic [BITS-1:0] ONE = {2'b00, {(EXPONENT-1){1'b1}}, {MANTISSA{1'b0}}};

@@ -139,7 +139,8 @@ fn build(folder: &Path, top: &str, format: Format, parameters: &[String]) -> Res
         .args(sources());
     match top {
         "units" => command.args(["units.sv", "units.cpp"]),
-        _ => command.arg("bench.cpp"),
+        // Processing elements are compiled once, and not once for each of the module's.
+        _ => command.args(["--hierarchical", "bench.cpp"]),
     };
     let output = command.output()?;
     if !output.status.success() {
