@@ -409,7 +409,8 @@ impl TileWork {
 
     /// Pairs of a primitive and a 4x4 block whose depths hide it; see [`Run::hidden_blocks`].
     pub fn hidden_blocks(&self) -> u32 {
-        self.runs.iter().map(|run| run.hidden_blocks).sum()
+        let blocks = self.runs.iter().map(|run| run.hidden_blocks);
+        blocks.fold(0, u32::saturating_add)
     }
 
     /// The parts of the list that hardware of this saturation, with or without hierarchical depth, fetches, in order.
