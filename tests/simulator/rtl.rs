@@ -159,7 +159,7 @@ fn compare(bench: &ModuleBench, module: &Module, lists: &[List]) -> Vec<Drawn> {
 fn the_module_draws_generated_tiles_as_the_model_does(case: &Case) {
     let design = design(case);
     let (format, bench) = (design.format, design.bench());
-    let count = if is_long() { 300 } else { 6 };
+    let count = if is_long() { 300 } else { 5 };
     let mut contributions = 0;
     for setting in Setting::ALL {
         let module = design.module(setting);
