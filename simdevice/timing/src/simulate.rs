@@ -452,9 +452,9 @@ pub fn even_frame(size: [u32; 2], pairs: u64, contributions: f64) -> FrameWork {
         work.contributions = (work.contributions as f64 * contributions) as u64;
         work
     };
-    let draw = crate::work::DrawWork {
+    let draw = DrawWork {
         tiles: (0..tiles).map(tile).collect(),
-        ..crate::work::DrawWork::default()
+        ..DrawWork::default()
     };
     FrameWork {
         size,
