@@ -7,7 +7,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use simdevice::timing::config::Config;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
+use std::sync::{Once, OnceLock};
 use timing_studies::exponential::{Exponential, exp2};
 use timing_studies::module::{Drawn, Groups, List, Module};
 use timing_studies::number::Format;
@@ -25,29 +25,87 @@ fn format(case: &Case) -> Format {
     found.expect("a format").1
 }
 
-/// A folder that keeps Verilator's build between test runs.
+/// A folder that keeps Verilator's build between test runs. Its files are written once, before two builds read them.
 fn folder() -> PathBuf {
-    Path::new(env!("CARGO_TARGET_TMPDIR")).join("rtl")
+    static FILES: Once = Once::new();
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("rtl");
+    FILES.call_once(|| rtl::write(&folder).expect("files"));
+    folder
 }
 
-/// A lock for one build at a time, because tests of a process share the build.
-static BUILDING: Mutex<()> = Mutex::new(());
+/// A module's format and the designs of its units.
+struct Design {
+    name: &'static str,
+    format: Format,
+    parameters: &'static [&'static str],
+    exponential: Exponential,
+    /// The bench, which all tests of the process share.
+    bench: OnceLock<ModuleBench>,
+}
 
-fn module_bench(format: Format) -> ModuleBench {
-    let _guard = BUILDING.lock();
-    ModuleBench::build(&folder(), format, &[]).expect("a bench")
+impl Design {
+    const fn of_presets(name: &'static str, format: Format) -> Self {
+        Self {
+            name,
+            format,
+            parameters: &[],
+            exponential: Exponential::Table,
+            bench: OnceLock::new(),
+        }
+    }
+
+    /// The other design of each unit: an adder with two paths, Booth's multiplier and the polynomial.
+    const fn other(name: &'static str, format: Format) -> Self {
+        Self {
+            name,
+            format,
+            parameters: &["-GTWO_PATHS=1", "-GBOOTH=1", "-GPOLYNOMIAL=1"],
+            exponential: Exponential::Polynomial,
+            bench: OnceLock::new(),
+        }
+    }
+
+    fn bench(&self) -> &ModuleBench {
+        self.bench.get_or_init(|| {
+            let parameters: Vec<_> = self.parameters.iter().map(ToString::to_string).collect();
+            ModuleBench::build(&folder(), self.format, &parameters).expect("a bench")
+        })
+    }
+
+    /// The model of the module in a setting.
+    fn module(&self, setting: Setting) -> Module {
+        let mut module = setting.module(self.format);
+        module.exponential = self.exponential;
+        module
+    }
+}
+
+static DESIGNS: [Design; 4] = [
+    Design::of_presets("fp32", Format::SINGLE),
+    Design::of_presets("fp16", Format::HALF),
+    Design::other("fp32, other units", Format::SINGLE),
+    Design::other("fp16, other units", Format::HALF),
+];
+
+/// The designs that are built: those of the presets or, in a long run, all.
+fn designs() -> Vec<Variant> {
+    let count = if is_long() { 4 } else { 2 };
+    let built = DESIGNS.iter().take(count);
+    built.map(|design| Variant::new(design.name)).collect()
+}
+
+fn design(case: &Case) -> &'static Design {
+    let found = DESIGNS.iter().find(|design| design.name == case.variant());
+    found.expect("a design")
 }
 
 #[gaurast_runner::test(each = formats(), needs = [Need::Program("verilator"), Need::Program("make"), Need::Program("c++")])]
 fn units_compute_the_models_bits(case: &Case) {
     let format = format(case);
-    let bench = {
-        let _guard = BUILDING.lock();
-        UnitBench::build(&folder(), format).expect("a bench")
-    };
+    let bench = UnitBench::build(&folder(), format).expect("a bench");
     let mut random = ChaCha8Rng::seed_from_u64(3);
     let mask = u32::MAX >> (32 - format.bits());
-    let count = if is_long() { 1_000_000 } else { 40_000 };
+    let count = if is_long() { 1_000_000 } else { 20_000 };
     let pairs: Vec<[u32; 2]> = (0..count)
         .map(|index| {
             let mut number = || match index % 3 {
@@ -97,16 +155,16 @@ fn compare(bench: &ModuleBench, module: &Module, lists: &[List]) -> Vec<Drawn> {
     drawn
 }
 
-#[gaurast_runner::test(each = formats(), needs = [Need::Program("verilator"), Need::Program("make"), Need::Program("c++")])]
+#[gaurast_runner::test(each = designs(), needs = [Need::Program("verilator"), Need::Program("make"), Need::Program("c++")])]
 fn the_module_draws_generated_tiles_as_the_model_does(case: &Case) {
-    let format = format(case);
-    let bench = module_bench(format);
-    let count = if is_long() { 300 } else { 10 };
+    let design = design(case);
+    let (format, bench) = (design.format, design.bench());
+    let count = if is_long() { 300 } else { 5 };
     let mut contributions = 0;
     for setting in Setting::ALL {
-        let module = setting.module(format);
+        let module = design.module(setting);
         let lists = tiles::generated(format, setting.groups, setting.masked, count, setting.seed);
-        let drawn = compare(&bench, &module, &lists);
+        let drawn = compare(bench, &module, &lists);
         contributions += drawn
             .iter()
             .map(|drawn| drawn.work.contributions)
@@ -115,21 +173,21 @@ fn the_module_draws_generated_tiles_as_the_model_does(case: &Case) {
     assert!(contributions > 1000 * count as u64, "{contributions}");
 }
 
-#[gaurast_runner::test(each = formats(), needs = [Need::Program("verilator"), Need::Program("make"), Need::Program("c++"), Need::Data("splats/playbot-125k.ply"), Need::Data("splats/skull.ply")])]
+#[gaurast_runner::test(each = designs(), needs = [Need::Program("verilator"), Need::Program("make"), Need::Program("c++"), Need::Data("splats/playbot-125k.ply"), Need::Data("splats/skull.ply")])]
 fn the_module_draws_real_tiles_as_the_model_does(case: &Case) {
-    let format = format(case);
-    let bench = module_bench(format);
+    let design = design(case);
+    let (format, bench) = (design.format, design.bench());
     let (count, size) = match is_long() {
         true => (350, [1280, 720]),
-        false => (4, [640, 360]),
+        false => (2, [640, 360]),
     };
     let mut contributions = 0;
     for path in ["splats/playbot-125k.ply", "splats/skull.ply"] {
         let view = View::open(&data(path), size);
-        let module = Module::new(format, Exponential::Table, Groups::Rows);
+        let module = Module::new(format, design.exponential, Groups::Rows);
         let lists = view.lists(format, None, count, 5);
         assert_eq!(lists.len(), count);
-        let drawn = compare(&bench, &module, &lists);
+        let drawn = compare(bench, &module, &lists);
         contributions += drawn
             .iter()
             .map(|drawn| drawn.work.contributions)
@@ -140,11 +198,12 @@ fn the_module_draws_real_tiles_as_the_model_does(case: &Case) {
 
 #[gaurast_runner::test(each = formats(), needs = [Need::Program("verilator"), Need::Program("make"), Need::Program("c++")])]
 fn the_modules_cycles_are_the_stepped_models(case: &Case) {
-    let format = format(case);
-    let bench = module_bench(format);
+    let design = design(case);
+    let (format, bench) = (design.format, design.bench());
+    let count = if is_long() { 120 } else { 24 };
     for setting in Setting::ALL {
-        let lists = tiles::generated(format, setting.groups, setting.masked, 24, setting.seed);
-        let cycles = Cycles::of(&bench, setting, format, &lists).expect("cycles");
+        let lists = tiles::generated(format, setting.groups, setting.masked, count, setting.seed);
+        let cycles = Cycles::of(bench, setting, format, &lists).expect("cycles");
         let [all, busy, dependency, memory, controller, modes] = cycles.by_cause();
         let near = |[ours, model]: [f64; 2], share: f64| {
             assert!(

@@ -4,7 +4,6 @@ use gaurast_oracle::oracle::project::project;
 use gaurast_oracle::oracle::splat::Splat;
 use gaurast_oracle::oracle::{OracleCamera, OracleState};
 use gaurast_oracle::scenes::SceneBuffers;
-use rand::seq::IndexedRandom;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use simdevice::timing::work::Mode;
@@ -239,7 +238,7 @@ pub fn triangles(format: Format, groups: Groups, random: &mut ChaCha8Rng) -> Lis
     }
 }
 
-/// Generated lists of every kind; one in four is of triangles.
+/// Generated lists: each kind of Gaussians, then triangles, and again from the first.
 pub fn generated(
     format: Format,
     groups: Groups,
@@ -248,12 +247,9 @@ pub fn generated(
     seed: u64,
 ) -> Vec<List> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let list = |index: usize| {
-        if index % 4 == 3 {
-            return triangles(format, groups, &mut random);
-        }
-        let kind = *KINDS.choose(&mut random).expect("a kind");
-        gaussians(format, masked.then_some(groups), kind, &mut random)
+    let list = |index: usize| match KINDS.get(index % (KINDS.len() + 1)) {
+        Some(&kind) => gaussians(format, masked.then_some(groups), kind, &mut random),
+        None => triangles(format, groups, &mut random),
     };
     (0..count).map(list).collect()
 }

@@ -6,6 +6,7 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use clap::{Args, ValueEnum};
 use gaurast_picture::Size;
@@ -15,7 +16,7 @@ use timing::config::{Config, ConfigError, DEFAULT_PRESET};
 use timing::fast::{self, TileSpan};
 use timing::raster::RasterReport;
 use timing::schedule::{self, Engine, ModuleSpan, Span};
-use timing::simulate::{self, Simulation};
+use timing::simulate::{self, Shared, Simulation};
 use timing::work::{Trace, TraceError};
 use timing_studies::what_if::{WhatIf, what_ifs};
 use timing_studies::{area, paper, rtl, stepped};
@@ -231,12 +232,13 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Error> {
             plot::roofline(frame, result, &machines[0].1).as_bytes(),
         )?;
     }
-    let spans = tile_spans(frame, &machines[0].1);
     if let Some(path) = &arguments.tiles {
+        let spans = tile_spans(frame, &machines[0].1);
         replace(path, plot::tiles(frame, &spans, &machines[0].1).as_bytes())?;
     }
     print(&match (arguments.format, results.as_slice()) {
         (Format::Table, [(_, one)]) if !arguments.every_frame => {
+            let spans = tile_spans(frame, &machines[0].1);
             report::one(frame, one, &config, &spans)
         }
         (Format::Table, many) => report::many(many),
@@ -256,22 +258,28 @@ fn areas(machines: &[(String, Config)], count: usize) -> Vec<f64> {
     machines.iter().map(of).cycle().take(count).collect()
 }
 
-/// Simulates the frame on every machine, on all of the host's cores.
+/// Simulates the frame on every machine. Each of the host's cores takes the next machine when it is free.
 fn simulate_all(frame: &FrameWork, machines: &[(String, Config)]) -> Vec<(String, Simulation)> {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let each = machines.len().div_ceil(cores).max(1);
-    let one = |(name, config): &(String, Config)| (name.clone(), simulate::simulate(frame, config));
-    std::thread::scope(|scope| {
-        let parts: Vec<_> = machines
-            .chunks(each)
-            .map(|part| scope.spawn(move || part.iter().map(one).collect::<Vec<_>>()))
+    let shared = Shared::new(frame);
+    let next = AtomicUsize::new(0);
+    let take = || {
+        let index = next.fetch_add(1, Ordering::Relaxed);
+        let (name, config) = machines.get(index)?;
+        Some((index, (name.clone(), shared.simulate(config))))
+    };
+    let mut results: Vec<_> = std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..cores.min(machines.len()))
+            .map(|_| scope.spawn(|| std::iter::from_fn(take).collect::<Vec<_>>()))
             .collect();
-        let results = parts.into_iter().flat_map(|part| match part.join() {
+        let results = threads.into_iter().flat_map(|thread| match thread.join() {
             Ok(results) => results,
             Err(panic) => std::panic::resume_unwind(panic),
         });
         results.collect()
-    })
+    });
+    results.sort_unstable_by_key(|(index, _)| *index);
+    results.into_iter().map(|(_, result)| result).collect()
 }
 
 /// The greatest number of pairs that are stepped clock by clock, which takes some minutes.
@@ -542,7 +550,7 @@ mod tests {
     }
 
     #[test]
-    fn the_paths_of_a_sweep_are_those_of_one_machine_after_the_other() {
+    fn a_sweep_has_the_results_of_one_machine_after_the_other() {
         let frame = simulate::even_frame([64, 64], 1000, 0.3);
         let machines: Vec<_> = (1..8)
             .map(|modules| {

@@ -188,7 +188,20 @@ pub fn roofline(frame: &FrameWork, result: &Simulation, config: &Config) -> Stri
 /// The greatest width of the picture of a frame's tiles in pixels.
 const WIDEST: f64 = 1280.0;
 
-/// A frame's tiles as squares, darker with more cycles. Each square's title has its cycles.
+/// The height of the line below the picture of a frame's tiles, in pixels.
+const CAPTION: f64 = 24.0;
+
+/// The colour of a share of the most cycles: from white over orange to dark red.
+fn heat(share: f64) -> String {
+    let [r, g, b] = [
+        255.0 - 120.0 * share.powi(3),
+        255.0 * (1.0 - share),
+        220.0 * (1.0 - share).powi(2),
+    ];
+    format!("rgb({r:.0},{g:.0},{b:.0})")
+}
+
+/// A frame's tiles as squares, darker with more cycles, above a scale. Each square's title has its cycles.
 pub fn tiles(frame: &FrameWork, spans: &[TileSpan], config: &Config) -> String {
     let [width, height] = frame.size.map(f64::from);
     let scale = (WIDEST / width.max(1.0)).min(1.0);
@@ -198,30 +211,43 @@ pub fn tiles(frame: &FrameWork, spans: &[TileSpan], config: &Config) -> String {
         .map(|span| span.end - span.begin)
         .fold(1.0, f64::max);
     let [width, height] = [width * scale, height * scale];
+    let whole = height + CAPTION;
     let mut out = String::new();
     // Writing to a string cannot fail.
     let _ = writeln!(
         out,
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width:.0}\" height=\"{height:.0}\" viewBox=\"0 0 {width:.0} {height:.0}\">\n\
-         <title>Cycles of each tile; the darkest takes {most:.0}</title>\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>"
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width:.0}\" height=\"{whole:.0}\" viewBox=\"0 0 {width:.0} {whole:.0}\" \
+         font-family=\"sans-serif\" font-size=\"12\">\n<title>Cycles of each tile; the darkest takes {most:.0}</title>\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>"
     );
     for span in spans {
         let cycles = span.end - span.begin;
         let [x, y] = span.at.map(|at| f64::from(at) * side);
-        // The colours go from white over orange to dark red.
-        let share = cycles / most;
-        let [r, g, b] = [
-            255.0 - 120.0 * share.powi(3),
-            255.0 * (1.0 - share),
-            220.0 * (1.0 - share).powi(2),
-        ];
+        let color = heat(cycles / most);
         let _ = writeln!(
             out,
-            "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{side:.1}\" height=\"{side:.1}\" fill=\"rgb({r:.0},{g:.0},{b:.0})\">\
+            "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{side:.1}\" height=\"{side:.1}\" fill=\"{color}\">\
              <title>{},{}: {cycles:.0} cycles</title></rect>",
             span.at[0], span.at[1]
         );
     }
+    // Tiles at the edge may reach beyond the picture.
+    let _ = writeln!(
+        out,
+        "<rect y=\"{height:.1}\" width=\"100%\" height=\"{CAPTION}\" fill=\"white\"/>"
+    );
+    let (top, base) = (height + 6.0, height + 17.0);
+    let _ = writeln!(out, "<text x=\"4\" y=\"{base:.1}\">0</text>");
+    for step in 0..=10 {
+        let (x, color) = (16 + 12 * step, heat(f64::from(step) / 10.0));
+        let _ = writeln!(
+            out,
+            "<rect x=\"{x}\" y=\"{top:.1}\" width=\"12\" height=\"12\" fill=\"{color}\"/>"
+        );
+    }
+    let _ = writeln!(
+        out,
+        "<text x=\"154\" y=\"{base:.1}\">{most:.0} cycles a tile</text>"
+    );
     out + "</svg>\n"
 }
 

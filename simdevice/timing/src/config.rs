@@ -702,6 +702,101 @@ mod tests {
         assert_eq!(count, RANGES.len());
     }
 
+    /// A number as a field of a table writes it: integers without a point.
+    fn written(number: f64, is_integer: bool) -> String {
+        if is_integer {
+            format!("{number:.0}")
+        } else {
+            format!("{number:e}")
+        }
+    }
+
+    #[test]
+    fn every_number_may_be_at_the_ends_of_its_range_and_not_beyond() {
+        let table = preset_table("paper-15x16", 0).unwrap();
+        let mut frame = crate::simulate::even_frame([64, 48], 3000, 0.3);
+        frame.draws[0].preprocess.float = 1e6;
+        frame.draws[0].sort.bytes = 1e6;
+        let mut triangles = frame.draws[0].clone();
+        triangles.mode = Mode::Triangle;
+        frame.draws.push(triangles);
+        for &(section, field, range) in RANGES {
+            let is_integer = table[section][field].is_integer();
+            let with = |number: f64| {
+                let text = written(number, is_integer);
+                let setting = format!("{section}.{field}={text}");
+                Config::preset("paper-15x16", &[setting])
+            };
+            let (accepted, refused) = match range {
+                Range::From(low, high) => (vec![low, high], vec![low - 1.0, high + 1.0]),
+                Range::Above(low, high) => (vec![high], vec![low, low - 1.0, high + 1.0]),
+                Range::OneOf(values) => {
+                    let values: Vec<_> = values.iter().map(|&value| f64::from(value)).collect();
+                    let others = values.iter().map(|value| value + 1.0).collect();
+                    (values, others)
+                }
+            };
+            for number in accepted {
+                let config = with(number);
+                let config = config.unwrap_or_else(|error| panic!("{section}.{field}: {error}"));
+                let result = crate::simulate::simulate(&frame, &config);
+                let numbers = [
+                    result.raster.cycles,
+                    result.stages.total(),
+                    result.fps,
+                    result.raster_speedup,
+                    result.energy.total(),
+                    result.baseline_mj,
+                ];
+                assert!(
+                    numbers
+                        .iter()
+                        .all(|number| number.is_finite() && *number >= 0.0),
+                    "{section}.{field}={number}: {numbers:?}"
+                );
+            }
+            let too_large = [1e19, f64::MAX];
+            for number in refused.into_iter().chain(too_large) {
+                assert!(with(number).is_err(), "{section}.{field}={number}");
+            }
+            for text in ["", "nan", "inf", "-inf", "1e400", "one", "0x10", "1,5"] {
+                let setting = format!("{section}.{field}={text}");
+                let config = Config::preset("paper-15x16", &[setting]);
+                assert!(config.is_err(), "{section}.{field}={text}");
+            }
+        }
+    }
+
+    #[test]
+    fn machines_with_all_numbers_at_one_end_are_simulated() {
+        let table = preset_table("paper-15x16", 0).unwrap();
+        let frame = crate::simulate::even_frame([64, 48], 3000, 0.3);
+        for end in [0, 1] {
+            let settings: Vec<_> = RANGES
+                .iter()
+                .map(|&(section, field, range)| {
+                    let number = match range {
+                        // A machine without modules has no rasterizer.
+                        Range::From(low, _) if field == "modules" && end == 0 => low + 1.0,
+                        Range::From(low, high) => [low, high][end],
+                        Range::Above(low, high) => [low + high * 1e-6, high][end],
+                        Range::OneOf(values) => f64::from(values[end * (values.len() - 1)]),
+                    };
+                    let text = written(number, table[section][field].is_integer());
+                    format!("{section}.{field}={text}")
+                })
+                .collect();
+            let config = Config::preset("paper-15x16", &settings);
+            let config = config.unwrap_or_else(|error| panic!("{error}"));
+            let result = crate::simulate::simulate(&frame, &config);
+            let numbers = [result.raster.cycles, result.fps, result.energy.total()];
+            assert!(
+                numbers.iter().all(|number| number.is_finite()),
+                "{numbers:?}"
+            );
+        }
+    }
+
     #[test]
     fn a_gaussian_takes_16_cycles_of_a_tile() {
         let raster = Config::preset("paper-15x16", &[]).unwrap().rasterizer;

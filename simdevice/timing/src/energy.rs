@@ -102,10 +102,10 @@ const MEASURED_PES: u32 = 16;
 /// The hardware whose power is known: this one with modules of the paper's width or, if its power is unknown, the
 /// paper's own.
 fn measured(config: &Config) -> Config {
-    let known = config.energy.module_power_w > 0.0;
-    let mut measured = match (known, Config::preset(crate::config::DEFAULT_PRESET, &[])) {
-        (false, Ok(paper)) => paper,
-        _ => config.clone(),
+    let mut measured = if config.energy.module_power_w > 0.0 {
+        config.clone()
+    } else {
+        Config::preset(crate::config::DEFAULT_PRESET, &[]).unwrap_or_else(|_| config.clone())
     };
     measured.rasterizer.pes_per_module = MEASURED_PES;
     measured

@@ -5,13 +5,16 @@
 //! cycles, for `c` cycles of evaluation and `b` bytes a step at `h` bytes per cycle, so they are not simulated one by
 //! one. If the modules' ports together are wider than main memory, steps are simulated one by one: time advances to the
 //! next end of an evaluation, a fetch or a write, each at a rate that is constant in between.
+//!
+//! All ports that move bytes have the same rate. Therefore the ends of transfers are known as they begin, on a clock
+//! that counts the bytes that each of these ports has moved: rates change the speed of that clock, and not the order of
+//! the ends. An event concerns one module and takes time that grows with the logarithm of the number of modules.
 
 use crate::config::{Config, Rasterizer};
-use crate::plan::{self, Part, Rates, Task};
+use crate::plan::{self, Division, Part, Rates, Task};
 use crate::raster::RasterReport;
 use crate::work::{FrameWork, Mode, Segment};
-use std::cmp::Reverse;
-use std::collections::{BinaryHeap, VecDeque};
+use std::collections::VecDeque;
 
 /// The time that a tile spends in a module, from its first evaluated primitive to its last.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,7 +40,16 @@ pub fn rasterize_tiles(
     config: &Config,
     others_gb_s: f64,
 ) -> (RasterReport, Vec<TileSpan>) {
-    let tasks = plan::tasks(frame, &config.rasterizer);
+    let tasks = plan::tasks(frame, &Division::of(&config.rasterizer));
+    rasterize_tasks(&tasks, config, others_gb_s)
+}
+
+/// Rasterizes the tasks of a frame, as [`rasterize_tiles`] does.
+pub fn rasterize_tasks(
+    tasks: &[Task],
+    config: &Config,
+    others_gb_s: f64,
+) -> (RasterReport, Vec<TileSpan>) {
     let rates = Rates::new(config, others_gb_s);
     let mut report = RasterReport::default();
     let mut queue = tasks.iter();
@@ -46,14 +58,7 @@ pub fn rasterize_tiles(
     let mut modules: Vec<_> = (0..raster.modules)
         .map(|_| Module::new(rates, contended))
         .collect();
-    for module in &mut modules {
-        module.proceed(&mut queue, raster, &mut report);
-    }
-    let now = if contended {
-        together(&mut modules, &mut queue, raster, &mut report)
-    } else {
-        apart(&mut modules, &mut queue, raster, &mut report)
-    };
+    let now = run(&mut modules, rates, &mut queue, raster, &mut report);
     report.cycles = now;
     // The part of the steps' time that exceeds evaluation is waiting for memory.
     let evaluation = report.modules.total();
@@ -68,72 +73,133 @@ pub fn rasterize_tiles(
     (report, spans)
 }
 
-/// Runs modules that share main memory until the queue is empty, and returns the cycles. At each event the rates of all
-/// ports may change.
-fn together<'a>(
+/// The bytes after which the clock of bytes begins anew, so that its numbers keep their digits.
+const NEW_CLOCK: f64 = 65_536.0;
+
+/// Runs modules until the queue is empty, and returns the cycles. At each event the rates of all ports may change.
+fn run<'a>(
     modules: &mut [Module],
+    rates: Rates,
     queue: &mut impl Iterator<Item = &'a Task>,
     raster: &Rasterizer,
     report: &mut RasterReport,
 ) -> f64 {
-    let mut now = 0.0;
+    let mut clock = Clock::default();
+    let mut ends = Ends::new(modules.len());
+    let mut asking = 0;
+    for (index, module) in modules.iter_mut().enumerate() {
+        module.begin(&clock, queue, raster, report);
+        asking += usize::from(module.asks());
+        ends.set(index, module.ends());
+    }
     loop {
-        let asking = modules.iter().filter(|module| module.asks()).count();
-        let Some(rates) = modules.first().map(|module| module.rates) else {
-            return now;
-        };
         let share = rates.port.min(rates.memory / asking.max(1) as f64);
-        let next = modules
-            .iter()
-            .map(|module| module.next_event(share))
-            .fold(f64::INFINITY, f64::min);
+        let [time, moved] = ends.first();
+        // A port moves one request in a cycle: the rest of the request's last cycle is lost.
+        let transfers = clock.now + ((moved - clock.moved) / share).ceil();
+        let next = time.min(transfers);
         if !next.is_finite() {
-            return now;
+            return clock.now;
         }
-        now += next;
-        for module in modules.iter_mut() {
-            module.advance(next, share);
-            module.settle(queue, raster, report);
+        if asking > 0 {
+            clock.moved += (next - clock.now) * share;
+        }
+        clock.now = next;
+        // Modules claim tiles in their own order if they end one at the same time.
+        while let Some(index) = ends.due([clock.now, clock.moved]) {
+            let module = &mut modules[index];
+            asking -= usize::from(module.asks());
+            module.end(&clock, queue, raster, report);
+            asking += usize::from(module.asks());
+            ends.set(index, module.ends());
+        }
+        if clock.moved > NEW_CLOCK {
+            for (index, module) in modules.iter_mut().enumerate() {
+                module.restart_clock(clock.moved);
+                ends.set(index, module.ends());
+            }
+            clock.moved = 0.0;
         }
     }
 }
 
-/// Runs modules that never wait for each other until the queue is empty, and returns the cycles. Each goes from event
-/// to event alone, and tiles are claimed in the order of time.
-fn apart<'a>(
-    modules: &mut [Module],
-    queue: &mut impl Iterator<Item = &'a Task>,
-    raster: &Rasterizer,
-    report: &mut RasterReport,
-) -> f64 {
-    // Times are not negative, so their bits have the same order.
-    let event = |index: usize, module: &Module| {
-        let next = module.now + module.next_event(module.rates.port);
-        next.is_finite().then(|| Reverse((next.to_bits(), index)))
-    };
-    let first = modules.iter().enumerate();
-    let mut events: BinaryHeap<_> = first
-        .filter_map(|(index, module)| event(index, module))
-        .collect();
-    let mut now = 0.0;
-    while let Some(Reverse((time, index))) = events.pop() {
-        now = f64::from_bits(time);
-        let module = &mut modules[index];
-        module.advance(now - module.now, module.rates.port);
-        module.now = now;
-        module.settle(queue, raster, report);
-        events.extend(event(index, module));
-    }
-    now
+/// The time on two clocks.
+#[derive(Clone, Copy, Debug, Default)]
+struct Clock {
+    /// Cycles from the frame's first fetch.
+    now: f64,
+    /// The bytes that a port would have moved if it had always asked.
+    moved: f64,
 }
 
-/// The rest of a module's current step, except for its port's transfers.
+/// The next ends of each module on both clocks, in two trees in which a node has the least of its children's ends.
+#[derive(Debug)]
+struct Ends {
+    /// The root is at 1, and the children of `i` are at `2i` and `2i + 1`.
+    nodes: Vec<[f64; 2]>,
+    leaves: usize,
+}
+
+impl Ends {
+    fn new(count: usize) -> Self {
+        let leaves = count.next_power_of_two();
+        Self {
+            nodes: vec![[f64::INFINITY; 2]; 2 * leaves],
+            leaves,
+        }
+    }
+
+    /// The first ends of all modules.
+    fn first(&self) -> [f64; 2] {
+        self.nodes[1]
+    }
+
+    fn set(&mut self, index: usize, ends: [f64; 2]) {
+        let mut node = self.leaves + index;
+        self.nodes[node] = ends;
+        while node > 1 {
+            node /= 2;
+            let [a, b] = [self.nodes[2 * node], self.nodes[2 * node + 1]];
+            let least = [0, 1].map(|clock| {
+                if b[clock] < a[clock] {
+                    b[clock]
+                } else {
+                    a[clock]
+                }
+            });
+            if self.nodes[node] == least {
+                return;
+            }
+            self.nodes[node] = least;
+        }
+    }
+
+    /// The first module, by its number, with an end that is not after `now`.
+    fn due(&self, now: [f64; 2]) -> Option<usize> {
+        let is_due = |node: usize| {
+            let ends = self.nodes[node];
+            ends[0] <= now[0] || ends[1] <= now[1]
+        };
+        if !is_due(1) {
+            return None;
+        }
+        let mut node = 1;
+        while node < self.leaves {
+            node = 2 * node + usize::from(!is_due(2 * node));
+        }
+        Some(node - self.leaves)
+    }
+}
+
+/// A module's current step, except for its port's transfers.
 #[derive(Clone, Copy, Debug)]
 struct Step {
+    /// The time at which the step begins.
+    begin: f64,
     /// Cycles of evaluation.
     cycles: f64,
-    /// True if evaluation begins a tile: a half of the buffer must be free for its pixels.
-    first_of_tile: bool,
+    /// The time at which evaluation ends; infinite while it waits for pixels to be written.
+    end: f64,
 }
 
 /// A transfer of a port. A port does its transfers in order.
@@ -144,6 +210,19 @@ struct Request {
     bytes: f64,
     /// True for a write of pixels, which no step waits for.
     write: bool,
+}
+
+/// The state of a port's first transfer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Transfer {
+    /// There is none, or it has not begun.
+    None,
+    /// Its first byte comes at this time.
+    Waiting(f64),
+    /// Bytes move until a port has moved this many.
+    Moving(f64),
+    /// Bytes move until this time, since nobody else takes a part of the rate.
+    Alone(f64),
 }
 
 /// A remainder of bytes that counts as zero, because of rounding.
@@ -178,6 +257,9 @@ struct Module {
     mode: Option<Mode>,
     step: Option<Step>,
     port: VecDeque<Request>,
+    /// The number of writes in `port`.
+    writes: usize,
+    transfer: Transfer,
     /// Cycles spent in steps.
     lasted: f64,
     /// The mode of the tile whose last batch the step evaluates, if it does.
@@ -198,87 +280,149 @@ impl Module {
             mode: None,
             step: None,
             port: VecDeque::new(),
+            writes: 0,
+            transfer: Transfer::None,
             lasted: 0.0,
             tile_ended: None,
         }
     }
 
-    /// True if the port moves bytes.
+    /// True if the port takes a part of the memory's rate.
     fn asks(&self) -> bool {
-        self.port
-            .front()
-            .is_some_and(|request| request.latency <= 0.0)
-    }
-
-    /// True if evaluation waits for pixels to be written: two halves hold pixels.
-    fn is_blocked(&self, step: &Step) -> bool {
-        // A step whose evaluation has ended does not wait for a free half.
-        step.first_of_tile
-            && step.cycles > 0.0
-            && self.port.iter().filter(|request| request.write).count() > 1
+        matches!(self.transfer, Transfer::Moving(_))
     }
 
     /// True if the step has ended, with all transfers that it waits for.
     fn is_done(&self) -> bool {
         self.step
-            .is_some_and(|step| step.cycles <= 0.0 && self.port.iter().all(|request| request.write))
+            .is_some_and(|step| step.end <= self.now && self.port.len() == self.writes)
     }
 
-    /// Cycles until the next end of an evaluation, a latency or a transfer.
-    fn next_event(&self, share: f64) -> f64 {
-        let mut next = f64::INFINITY;
-        if let Some(step) = &self.step
-            && step.cycles > 0.0
-            && !self.is_blocked(step)
-        {
-            next = step.cycles;
-        }
-        match self.port.front() {
-            Some(request) if request.latency > 0.0 => next.min(request.latency),
-            // A port moves one request in a cycle: the rest of the request's last cycle is lost.
-            Some(request) => next.min(((request.bytes - SLACK) / share).ceil().max(1.0)),
-            None => next,
-        }
-    }
-
-    /// Advances the time by `cycles`.
-    fn advance(&mut self, cycles: f64, share: f64) {
-        self.now += cycles;
-        let blocked = self.step.is_some_and(|step| self.is_blocked(&step));
-        if let Some(step) = &mut self.step {
-            self.lasted += cycles;
-            if !blocked {
-                step.cycles -= cycles;
+    /// The next end on each clock: of an evaluation, of a latency or of a transfer.
+    fn ends(&self) -> [f64; 2] {
+        let evaluation = match self.step {
+            Some(step) if step.end > self.now => step.end,
+            _ => f64::INFINITY,
+        };
+        match self.transfer {
+            Transfer::None => [evaluation, f64::INFINITY],
+            Transfer::Waiting(time) | Transfer::Alone(time) => {
+                [evaluation.min(time), f64::INFINITY]
             }
-        }
-        if let Some(request) = self.port.front_mut() {
-            if request.latency > 0.0 {
-                request.latency -= cycles;
-                return;
-            }
-            request.bytes -= cycles * share;
-            if request.bytes <= SLACK {
-                self.port.pop_front();
-            }
+            Transfer::Moving(bytes) => [evaluation, bytes],
         }
     }
 
-    /// Begins the next steps and writes after the end of a step or a tile.
-    fn settle<'a>(
+    /// Claims the first tile.
+    fn begin<'a>(
         &mut self,
+        clock: &Clock,
         queue: &mut impl Iterator<Item = &'a Task>,
         raster: &Rasterizer,
         report: &mut RasterReport,
     ) {
+        self.proceed(queue, raster, report);
+        self.transfer_next(clock);
+    }
+
+    /// Takes note that the clock of bytes begins anew after `moved`.
+    fn restart_clock(&mut self, moved: f64) {
+        if let Transfer::Moving(until) = &mut self.transfer {
+            *until -= moved;
+        }
+    }
+
+    /// Ends what ends at this time, and goes on.
+    fn end<'a>(
+        &mut self,
+        clock: &Clock,
+        queue: &mut impl Iterator<Item = &'a Task>,
+        raster: &Rasterizer,
+        report: &mut RasterReport,
+    ) {
+        self.now = clock.now;
+        let moved = match self.transfer {
+            Transfer::None => false,
+            Transfer::Waiting(time) => {
+                if time <= clock.now {
+                    self.move_bytes(clock);
+                }
+                false
+            }
+            Transfer::Moving(until) => until <= clock.moved,
+            Transfer::Alone(time) => time <= clock.now,
+        };
+        if moved {
+            self.transfer = Transfer::None;
+            let request = self.port.pop_front();
+            self.writes -= usize::from(request.is_some_and(|request| request.write));
+        }
         // Steps of no length are followed at once.
         while self.is_done() {
             self.proceed(queue, raster, report);
         }
         // A tile may end while the next batch is still being fetched.
-        if self.step.is_some_and(|step| step.cycles <= 0.0) {
+        if self.step.is_some_and(|step| step.end <= self.now) {
             let write = self.end_tile(raster, report);
-            self.port.extend(write);
+            self.ask(write);
         }
+        // A half of the buffer may be free now for the pixels of a tile that waits.
+        if moved
+            && self.writes <= 1
+            && let Some(step) = &mut self.step
+            && step.end == f64::INFINITY
+        {
+            step.end = self.now + step.cycles;
+        }
+        self.transfer_next(clock);
+    }
+
+    /// Begins the port's next transfer, if it has one and none has begun.
+    fn transfer_next(&mut self, clock: &Clock) {
+        if self.transfer != Transfer::None {
+            return;
+        }
+        match self.port.front() {
+            Some(request) if request.latency > 0.0 => {
+                self.transfer = Transfer::Waiting(self.now + request.latency);
+            }
+            Some(_) => self.move_bytes(clock),
+            None => {}
+        }
+    }
+
+    /// Begins to move the bytes of the port's first transfer.
+    fn move_bytes(&mut self, clock: &Clock) {
+        let bytes = self.port.front().map_or(0.0, |request| request.bytes);
+        // Every transfer takes some time.
+        let bytes = (bytes - SLACK).max(SLACK);
+        self.transfer = if self.contended {
+            Transfer::Moving(clock.moved + bytes)
+        } else {
+            Transfer::Alone(self.now + (bytes / self.rates.port).ceil())
+        };
+    }
+
+    /// Puts a request, if there is one, into the port's queue.
+    fn ask(&mut self, request: Option<Request>) {
+        self.writes += usize::from(request.is_some_and(|request| request.write));
+        self.port.extend(request);
+    }
+
+    /// Begins a step. The first of a tile waits until a half of the buffer is free for its pixels: two halves hold
+    /// pixels.
+    fn begin_step(&mut self, cycles: f64, first_of_tile: bool) {
+        let is_blocked = first_of_tile && cycles > 0.0 && self.writes > 1;
+        let end = if is_blocked {
+            f64::INFINITY
+        } else {
+            self.now + cycles
+        };
+        self.step = Some(Step {
+            begin: self.now,
+            cycles,
+            end,
+        });
     }
 
     /// Goes on to the next step, or to a run of equal steps, if there is any.
@@ -288,7 +432,9 @@ impl Module {
         raster: &Rasterizer,
         report: &mut RasterReport,
     ) {
-        self.step = None;
+        if let Some(step) = self.step.take() {
+            self.lasted += self.now - step.begin;
+        }
         let write = self.end_tile(raster, report);
         if let Some(current) = &mut self.current
             && current.count > 1.0
@@ -299,36 +445,27 @@ impl Module {
                 bytes,
                 ..
             } = *current;
-            let first_of_tile = false;
             if self.contended || write.is_some() || !self.port.is_empty() {
                 current.count -= 1.0;
-                self.port.push_back(Request {
+                self.ask(Some(Request {
                     latency: 0.0,
                     bytes,
                     write: false,
-                });
-                self.port.extend(write);
-                self.step = Some(Step {
-                    cycles,
-                    first_of_tile,
-                });
+                }));
+                self.ask(write);
+                self.begin_step(cycles, false);
                 return;
             }
             // A run of equal steps, in closed form.
             current.count = 1.0;
             let each = cycles.max(((bytes - SLACK) / self.rates.port).ceil());
-            let cycles = (count - 1.0) * each;
-            self.step = Some(Step {
-                cycles,
-                first_of_tile,
-            });
+            self.begin_step((count - 1.0) * each, false);
             return;
         }
         if self.claimed.is_empty()
             && let Some(task) = queue.next()
         {
-            self.claimed = self.batches(task, raster, report);
-            self.places.push_back(task.at);
+            self.claim(task, raster, report);
         }
         let next = self.claimed.pop_front();
         let before = std::mem::replace(&mut self.current, next);
@@ -339,14 +476,14 @@ impl Module {
             } else {
                 0.0
             };
-            self.port.push_back(Request {
+            self.ask(Some(Request {
                 latency,
                 bytes: next.bytes,
                 write: false,
-            });
+            }));
         }
         self.started = true;
-        self.port.extend(write);
+        self.ask(write);
         self.tile_ended = before
             .filter(|batch| batch.last_of_tile)
             .map(|batch| batch.mode);
@@ -362,10 +499,8 @@ impl Module {
             });
         }
         if before.is_some() || next.is_some() {
-            self.step = Some(Step {
-                cycles: before.map_or(0.0, |batch| batch.cycles),
-                first_of_tile: before.is_some_and(|batch| batch.first_of_tile),
-            });
+            let cycles = before.map_or(0.0, |batch| batch.cycles);
+            self.begin_step(cycles, before.is_some_and(|batch| batch.first_of_tile));
         }
     }
 
@@ -386,14 +521,10 @@ impl Module {
         })
     }
 
-    /// The batches of a tile, with equal ones grouped.
-    fn batches(
-        &mut self,
-        task: &Task,
-        raster: &Rasterizer,
-        report: &mut RasterReport,
-    ) -> VecDeque<Batches> {
-        let mut out = VecDeque::new();
+    /// Claims a tile: its batches, with equal ones grouped.
+    fn claim(&mut self, task: &Task, raster: &Rasterizer, report: &mut RasterReport) {
+        self.places.push_back(task.at);
+        let out = &mut self.claimed;
         for part in &task.parts {
             let mut begin = f64::from(raster.tile_overhead);
             report.modules.controller += begin;
@@ -404,7 +535,7 @@ impl Module {
                 begin += switch;
             }
             self.mode = Some(part.mode);
-            part_batches(part, raster, begin, report, &mut out);
+            part_batches(part, raster, begin, report, out);
         }
         if let Some(first) = out.front_mut() {
             first.first_of_tile = true;
@@ -412,7 +543,6 @@ impl Module {
         if let Some(last) = out.iter_mut().rfind(|batches| !batches.wasted) {
             last.last_of_tile = true;
         }
-        out
     }
 }
 
@@ -539,5 +669,47 @@ mod tests {
         let modules = &report.modules;
         assert!(in_tiles >= modules.busy && in_tiles <= modules.total() + 1e-6);
         assert!(spans.iter().all(|span| span.end <= report.cycles + 1e-6));
+    }
+    #[test]
+    fn ends_come_in_the_order_of_time_and_then_of_modules() {
+        for count in [1, 2, 3, 15, 16, 33] {
+            let mut ends = Ends::new(count);
+            let mut all = vec![[f64::INFINITY; 2]; count];
+            assert_eq!(ends.due([1e300; 2]), None);
+            for step in 0..2000_usize {
+                // Multiplication by an odd number scatters the steps.
+                let scattered = step.wrapping_mul(2_654_435_761) >> 7;
+                let index = scattered % count;
+                let end = |shift: usize| match scattered >> shift & 31 {
+                    0..8 => f64::INFINITY,
+                    number => number as f64,
+                };
+                all[index] = [end(8), end(13)];
+                ends.set(index, all[index]);
+                let least = |clock: usize| {
+                    let of = all.iter().map(|ends| ends[clock]);
+                    of.fold(f64::INFINITY, f64::min)
+                };
+                assert_eq!(ends.first(), [least(0), least(1)]);
+                let now = [(step % 29) as f64, (step % 31) as f64];
+                let is_due = |ends: &[f64; 2]| ends[0] <= now[0] || ends[1] <= now[1];
+                assert_eq!(ends.due(now), all.iter().position(is_due));
+            }
+        }
+    }
+
+    #[test]
+    fn a_new_clock_of_bytes_changes_no_cycle() {
+        // Transfers of this size begin the clock anew many times; 15 ports ask for more than there is.
+        let settings = ["bandwidth_gb_s=20", "batch=64"].map(str::to_owned);
+        let config = Config::preset("paper-15x16", &settings).unwrap();
+        let short = rasterize(&even_frame([240, 16], 15 * 640, 0.3), &config, 0.0);
+        let long = rasterize(&even_frame([240, 16], 15 * 640_000, 0.3), &config, 0.0);
+        assert!(long.bytes_in / 15.0 > 100.0 * NEW_CLOCK);
+        // The port of each module moves a fifteenth of 18 bytes a cycle.
+        let cycles = |report: &RasterReport| report.bytes_in / 18.0;
+        let rest = long.cycles - short.cycles - (cycles(&long) - cycles(&short));
+        // Each transfer may lose a part of its last cycle.
+        assert!((0.0..=9990.0).contains(&rest), "{rest}");
     }
 }

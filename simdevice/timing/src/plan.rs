@@ -29,19 +29,52 @@ pub struct Part {
     pub left_over: u32,
 }
 
+/// The settings of a rasterizer that its tasks depend on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Division {
+    /// The side of a tile in pixels.
+    pub tile_side: u32,
+    /// The granularity at which finished pixels are skipped, for Gaussians.
+    pub gaussians: Saturation,
+    /// The same for triangles.
+    pub triangles: Saturation,
+    /// True if hidden primitives are dropped.
+    pub hierarchical_depth: bool,
+}
+
+impl Division {
+    /// The settings of a rasterizer.
+    pub fn of(raster: &Rasterizer) -> Self {
+        Self {
+            tile_side: raster.tile_side,
+            gaussians: raster.granularity(Mode::Gaussian),
+            triangles: raster.granularity(Mode::Triangle),
+            hierarchical_depth: raster.hierarchical_depth,
+        }
+    }
+
+    /// The granularity at which pixels are skipped in a mode.
+    pub fn granularity(&self, mode: Mode) -> Saturation {
+        match mode {
+            Mode::Triangle => self.triangles,
+            Mode::Gaussian => self.gaussians,
+        }
+    }
+}
+
 /// The tasks of a frame in the order in which modules take them.
-pub fn tasks(frame: &FrameWork, raster: &Rasterizer) -> Vec<Task> {
+pub fn tasks(frame: &FrameWork, division: &Division) -> Vec<Task> {
     let mut places = HashMap::new();
     let mut tasks: Vec<Task> = Vec::new();
     for draw in &frame.draws {
         let tiles = draw
             .tiles
             .iter()
-            .map(|tile| (tile.at, part(draw.mode, tile, raster)));
-        let parts: Vec<_> = if raster.tile_side == TILE_SIDE {
+            .map(|tile| (tile.at, part(draw.mode, tile, division)));
+        let parts: Vec<_> = if division.tile_side == TILE_SIDE {
             tiles.collect()
         } else {
-            resized(draw, tiles, raster)
+            resized(draw, tiles, division)
         };
         for (at, part) in parts {
             if part.needed == 0 {
@@ -61,10 +94,10 @@ pub fn tasks(frame: &FrameWork, raster: &Rasterizer) -> Vec<Task> {
 }
 
 /// One draw in a tile of the trace, with the primitives that the hardware fetches.
-fn part(mode: Mode, tile: &TileWork, raster: &Rasterizer) -> Part {
+fn part(mode: Mode, tile: &TileWork, division: &Division) -> Part {
     // Hidden primitives are fetched, too, and so are triangles of which only the bounding box reaches the tile.
     let segments: Vec<_> = tile
-        .segments(raster.granularity(mode), raster.hierarchical_depth)
+        .segments(division.granularity(mode), division.hierarchical_depth)
         .collect();
     let needed: u32 = segments.iter().map(|segment| segment.primitives).sum();
     Part {
@@ -80,7 +113,7 @@ fn part(mode: Mode, tile: &TileWork, raster: &Rasterizer) -> Part {
 fn resized(
     draw: &DrawWork,
     tiles: impl Iterator<Item = ([u32; 2], Part)>,
-    raster: &Rasterizer,
+    division: &Division,
 ) -> Vec<([u32; 2], Part)> {
     let pairs = |side: u32| {
         let index = TILE_SIDES.iter().position(|&known| known == side)?;
@@ -88,14 +121,14 @@ fn resized(
     };
     // Without counts, a primitive is taken to be in all pieces of a tile that is divided, and in one of the tiles that
     // are joined.
-    let unknown = f64::from(TILE_SIDE / raster.tile_side.min(TILE_SIDE)).powi(2);
-    let ratio = match (pairs(raster.tile_side), pairs(TILE_SIDE)) {
+    let unknown = f64::from(TILE_SIDE / division.tile_side.min(TILE_SIDE)).powi(2);
+    let ratio = match (pairs(division.tile_side), pairs(TILE_SIDE)) {
         (Some(these), Some(known)) => these / known,
         _ => unknown,
     };
-    let per_pixel = matches!(raster.granularity(draw.mode), Saturation::Reached);
-    if raster.tile_side > TILE_SIDE {
-        let factor = raster.tile_side / TILE_SIDE;
+    let per_pixel = matches!(division.granularity(draw.mode), Saturation::Reached);
+    if division.tile_side > TILE_SIDE {
+        let factor = division.tile_side / TILE_SIDE;
         let mut joined: BTreeMap<[u32; 2], Vec<Part>> = BTreeMap::new();
         for ([x, y], part) in tiles {
             let at = [y / factor, x / factor];
@@ -107,7 +140,7 @@ fn resized(
         };
         return joined.into_iter().map(of).collect();
     }
-    let factor = TILE_SIDE / raster.tile_side;
+    let factor = TILE_SIDE / division.tile_side;
     let pieces = factor * factor;
     let share = ratio / f64::from(pieces);
     let mut out = Vec::new();
@@ -212,7 +245,7 @@ mod tests {
             ..FrameWork::default()
         };
         let config = Config::preset("paper-15x16", &[]).unwrap();
-        let tasks = tasks(&frame, &config.rasterizer);
+        let tasks = tasks(&frame, &Division::of(&config.rasterizer));
         let modes: Vec<Vec<_>> = tasks
             .iter()
             .map(|task| task.parts.iter().map(|part| part.mode).collect())
@@ -265,7 +298,7 @@ mod tests {
                 format!("hierarchical_depth={hierarchical}"),
             ];
             let config = Config::preset("paper-15x16", &settings).unwrap();
-            evaluations(&tasks(&frame, &config.rasterizer)) / 16
+            evaluations(&tasks(&frame, &Division::of(&config.rasterizer))) / 16
         };
         assert_eq!([with("reached", false), with("reached", true)], [64, 40]);
         assert_eq!([with("tile", false), with("tile", true)], [160, 96]);
@@ -287,7 +320,7 @@ mod tests {
         for (side, tiles, listed) in [(8u32, 64, 50), (16, 16, 100), (32, 4, 200), (64, 1, 400)] {
             let setting = format!("tile_side={side}");
             let config = Config::preset("paper-15x16", &[setting]).unwrap();
-            let tasks = tasks(&frame, &config.rasterizer);
+            let tasks = tasks(&frame, &Division::of(&config.rasterizer));
             assert_eq!(tasks.len(), tiles, "{side}");
             assert!(tasks.iter().all(|task| task.parts[0].needed == listed));
             let pixels = u64::from(side * side);

@@ -1,14 +1,16 @@
 //! The simulation of one frame on one configuration: all models of this crate combined.
 
-use crate::config::{Config, Lists};
+use crate::config::{Config, Lists, Rasterizer};
 use crate::energy::{self, Changed, Energy};
 use crate::fast;
+use crate::plan::{self, Division, Task};
 use crate::raster::RasterReport;
 use crate::schedule::{self, Policy, Span, Stages};
 use crate::shader_cores::{self, Roofline};
-use crate::work::{FrameWork, Mode, Saturation};
+use crate::work::{DrawWork, FrameWork, Mode, Saturation};
 use serde::Serialize;
 use std::borrow::Cow;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// The time and energy of a frame, with the rasterizer and without it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -78,49 +80,134 @@ impl Gains {
     };
 }
 
+/// A frame with all that simulations on several machines share. Threads may use it at the same time.
+#[derive(Debug)]
+pub struct Shared<'a> {
+    exact: Listed<'a>,
+    squares: OnceLock<Listed<'a>>,
+    /// The frame's triangles; none if all its draws are of Gaussians.
+    triangles: OnceLock<Option<Listed<'a>>>,
+}
+
+/// A frame with lists of one kind.
+#[derive(Debug)]
+struct Listed<'a> {
+    frame: Cow<'a, FrameWork>,
+    baseline_evaluations: OnceLock<f64>,
+    divided: Mutex<Vec<(Division, Arc<Divided>)>>,
+}
+
+/// A frame's work for rasterizers of one division.
+#[derive(Debug)]
+struct Divided {
+    tasks: Vec<Task>,
+    changed: Changed,
+}
+
+impl<'a> Listed<'a> {
+    fn new(frame: Cow<'a, FrameWork>) -> Self {
+        Self {
+            frame,
+            baseline_evaluations: OnceLock::new(),
+            divided: Mutex::default(),
+        }
+    }
+
+    /// The evaluations of stage 3 on shader cores. The original code ends a tile's list when all its pixels are
+    /// finished.
+    fn baseline_evaluations(&self) -> f64 {
+        *self.baseline_evaluations.get_or_init(|| {
+            let draws = self.frame.draws.iter();
+            let gaussians = draws.filter(|draw| draw.mode == Mode::Gaussian);
+            let evaluations = |draw: &DrawWork| draw.evaluations(Saturation::Tile, false);
+            gaussians.map(evaluations).sum::<u64>() as f64
+        })
+    }
+
+    /// The work for a rasterizer, made when it is first asked for.
+    fn divided(&self, raster: &Rasterizer) -> Arc<Divided> {
+        let division = Division::of(raster);
+        let mut known = self.divided.lock().unwrap_or_else(PoisonError::into_inner);
+        let found = known.iter().find(|(of, _)| *of == division);
+        if let Some((_, divided)) = found {
+            return Arc::clone(divided);
+        }
+        let divided = Arc::new(Divided {
+            tasks: plan::tasks(&self.frame, &division),
+            changed: changed(&self.frame, &division),
+        });
+        known.push((division, Arc::clone(&divided)));
+        divided
+    }
+
+    /// Rasterizes while others move `others_gb_s` to and from main memory.
+    fn rasterize(&self, config: &Config, others_gb_s: f64) -> RasterReport {
+        let divided = self.divided(&config.rasterizer);
+        fast::rasterize_tasks(&divided.tasks, config, others_gb_s).0
+    }
+}
+
+impl<'a> Shared<'a> {
+    /// A frame of which nothing is known yet.
+    pub fn new(frame: &'a FrameWork) -> Self {
+        Self {
+            exact: Listed::new(Cow::Borrowed(frame)),
+            squares: OnceLock::new(),
+            triangles: OnceLock::new(),
+        }
+    }
+
+    fn listed(&self, lists: Lists) -> &Listed<'a> {
+        match lists {
+            Lists::Exact => &self.exact,
+            Lists::Squares => self
+                .squares
+                .get_or_init(|| Listed::new(Cow::Owned(self.exact.frame.with_squares()))),
+        }
+    }
+
+    /// Milliseconds of the frame's triangles in a rasterizer for triangles, which every GPU has: this one's modules or,
+    /// if there are none, as many as the paper's, because nothing is published about the GPU's own.
+    fn triangles_ms(&self, config: &Config) -> f64 {
+        let triangles = self.triangles.get_or_init(|| {
+            let frame = &self.exact.frame;
+            let is_gaussian = |draw: &DrawWork| draw.mode == Mode::Gaussian;
+            let triangles = || Listed::new(Cow::Owned(frame.of_mode(Mode::Triangle)));
+            (!frame.draws.iter().all(is_gaussian)).then(triangles)
+        });
+        let Some(triangles) = triangles else {
+            return 0.0;
+        };
+        let mut config = config.clone();
+        if config.rasterizer.modules == 0 {
+            config.rasterizer.modules = TRIANGLE_MODULES;
+        }
+        let report = triangles.rasterize(&config, 0.0);
+        report.milliseconds(config.rasterizer.clock_ghz)
+    }
+}
+
 /// The evaluations of stage 3 on shader cores. The original code ends a tile's list when all its pixels are finished.
 pub fn baseline_evaluations(frame: &FrameWork) -> f64 {
-    let gaussians = |draw: &&crate::work::DrawWork| draw.mode == Mode::Gaussian;
-    let evaluations = |draw: &crate::work::DrawWork| draw.evaluations(Saturation::Tile, false);
-    let draws = frame.draws.iter().filter(gaussians);
-    draws.map(evaluations).sum::<u64>() as f64
+    Listed::new(Cow::Borrowed(frame)).baseline_evaluations()
 }
 
-/// Milliseconds of stage 3 if shader cores draw the Gaussians of a frame's lists.
-fn baseline_raster_ms(frame: &FrameWork, config: &Config) -> f64 {
-    shader_cores::stage_3_ms(baseline_evaluations(frame), config) + triangles_ms(frame, config)
-}
-
-/// The frame with lists of a kind.
-fn listed(frame: &FrameWork, lists: Lists) -> Cow<'_, FrameWork> {
-    match lists {
-        Lists::Exact => Cow::Borrowed(frame),
-        Lists::Squares => Cow::Owned(frame.with_squares()),
+/// The kind of the lists that the configuration's stage 3 uses: the rasterizer's or, if it has no modules, the
+/// baseline's.
+fn lists_of_rasterizer(config: &Config) -> Lists {
+    match config.rasterizer.modules {
+        0 => config.baseline.lists,
+        _ => config.rasterizer.lists,
     }
 }
 
 /// The frame with the lists that the configuration's stage 3 uses: the rasterizer's or, if it has no modules, the
 /// baseline's.
 pub fn of_rasterizer<'a>(frame: &'a FrameWork, config: &Config) -> Cow<'a, FrameWork> {
-    let lists = match config.rasterizer.modules {
-        0 => config.baseline.lists,
-        _ => config.rasterizer.lists,
-    };
-    listed(frame, lists)
-}
-
-/// Milliseconds of the frame's triangles in a rasterizer for triangles, which every GPU has: this one's modules or, if
-/// there are none, as many as the paper's, because nothing is published about the GPU's own.
-fn triangles_ms(frame: &FrameWork, config: &Config) -> f64 {
-    if frame.draws.iter().all(|draw| draw.mode == Mode::Gaussian) {
-        return 0.0;
+    match lists_of_rasterizer(config) {
+        Lists::Exact => Cow::Borrowed(frame),
+        Lists::Squares => Cow::Owned(frame.with_squares()),
     }
-    let mut config = config.clone();
-    if config.rasterizer.modules == 0 {
-        config.rasterizer.modules = TRIANGLE_MODULES;
-    }
-    let triangles = frame.of_mode(Mode::Triangle);
-    fast::rasterize(&triangles, &config, 0.0).milliseconds(config.rasterizer.clock_ghz)
 }
 
 /// The number of modules of the triangle rasterizer of a GPU without GauRast: the paper's.
@@ -165,16 +252,16 @@ impl Both {
 }
 
 /// The times of the stages if frames don't overlap.
-fn serial(frame: &FrameWork, config: &Config, baseline_raster_ms: f64) -> Both {
+fn serial(listed: &Listed, config: &Config, baseline_raster_ms: f64) -> Both {
     let has_rasterizer = config.rasterizer.modules > 0;
     let mut raster = RasterReport::default();
     let mut raster_ms = baseline_raster_ms;
     if has_rasterizer {
-        raster = fast::rasterize(frame, config, 0.0);
+        raster = listed.rasterize(config, 0.0);
         raster_ms = raster.milliseconds(config.rasterizer.clock_ghz);
     }
     Both {
-        shader: on_shader_cores(frame, config, 0.0),
+        shader: on_shader_cores(&listed.frame, config, 0.0),
         raster,
         raster_ms,
         contention_gb_s: 0.0,
@@ -182,13 +269,14 @@ fn serial(frame: &FrameWork, config: &Config, baseline_raster_ms: f64) -> Both {
 }
 
 /// The times if a frame's work on shader cores overlaps stage 3 of another frame: both move bytes through one memory.
-fn collaborative(frame: &FrameWork, config: &Config, alone: &Both) -> Both {
+fn collaborative(listed: &Listed, config: &Config, alone: &Both) -> Both {
+    let frame = &listed.frame;
     let moved = alone.raster.bytes_in + alone.raster.bytes_out;
     let shader = on_shader_cores(frame, config, moved);
     let bytes: f64 = frame.shader().iter().map(|stage| stage.bytes).sum();
     let time = milliseconds(&shader);
     let contention_gb_s = if time > 0.0 { bytes / time * 1e-6 } else { 0.0 };
-    let raster = fast::rasterize(frame, config, contention_gb_s);
+    let raster = listed.rasterize(config, contention_gb_s);
     Both {
         shader,
         raster_ms: raster.milliseconds(config.rasterizer.clock_ghz),
@@ -199,15 +287,35 @@ fn collaborative(frame: &FrameWork, config: &Config, alone: &Both) -> Both {
 
 /// Simulates a frame.
 pub fn simulate(frame: &FrameWork, config: &Config) -> Simulation {
+    Shared::new(frame).simulate(config)
+}
+
+impl Shared<'_> {
+    /// Simulates the frame on a machine, as [`simulate`] does.
+    pub fn simulate(&self, config: &Config) -> Simulation {
+        let of_baseline = self.listed(config.baseline.lists);
+        let of_rasterizer = self.listed(lists_of_rasterizer(config));
+        let triangles_ms = self.triangles_ms(config);
+        simulate_listed(of_baseline, of_rasterizer, triangles_ms, config)
+    }
+}
+
+/// Simulates a frame with the baseline's lists and with the rasterizer's.
+fn simulate_listed(
+    of_baseline: &Listed,
+    of_rasterizer: &Listed,
+    triangles_ms: f64,
+    config: &Config,
+) -> Simulation {
     let policy = policy(config);
-    let of_baseline = listed(frame, config.baseline.lists);
-    let of_rasterizer = of_rasterizer(frame, config);
-    let frame: &FrameWork = &of_rasterizer;
-    let on_baseline = on_shader_cores(&of_baseline, config, 0.0);
-    let baseline_raster_ms = baseline_raster_ms(&of_baseline, config);
-    let same_lists_ms = self::baseline_raster_ms(frame, config);
+    let on_baseline = on_shader_cores(&of_baseline.frame, config, 0.0);
+    let on_cores_ms = |listed: &Listed| {
+        shader_cores::stage_3_ms(listed.baseline_evaluations(), config) + triangles_ms
+    };
+    let baseline_raster_ms = on_cores_ms(of_baseline);
+    let same_lists_ms = on_cores_ms(of_rasterizer);
     let baseline_ms = milliseconds(&on_baseline) + baseline_raster_ms;
-    let alone = serial(frame, config, baseline_raster_ms);
+    let alone = serial(of_rasterizer, config, baseline_raster_ms);
     let (raster_alone, stages_alone) = (alone.raster.clone(), alone.stages());
     let fps = |stages, collaborative| {
         schedule::fps(
@@ -227,13 +335,13 @@ pub fn simulate(frame: &FrameWork, config: &Config) -> Simulation {
     let mut fps_collaborative = fps_serial;
     let mut chosen = alone;
     if policy.has_rasterizer {
-        let together = collaborative(frame, config, &chosen);
+        let together = collaborative(of_rasterizer, config, &chosen);
         fps_collaborative = fps(together.stages(), true);
         if policy.collaborative {
             chosen = together;
         }
     }
-    let changed = changed(frame, config);
+    let changed = of_rasterizer.divided(&config.rasterizer).changed;
     let mut energy = Energy::default();
     if policy.has_rasterizer {
         energy = energy::rasterizer(&chosen.raster, changed, config);
@@ -308,7 +416,7 @@ pub fn timeline(frames: &[Simulation], config: &Config) -> Vec<Span> {
 }
 
 /// The shares of evaluations that changed a pixel.
-fn changed(frame: &FrameWork, config: &Config) -> Changed {
+fn changed(frame: &FrameWork, division: &Division) -> Changed {
     let share = |mode| {
         let (mut changed, mut evaluated) = (0, 0);
         for draw in frame.draws.iter().filter(|draw| draw.mode == mode) {
@@ -317,8 +425,7 @@ fn changed(frame: &FrameWork, config: &Config) -> Changed {
                 .iter()
                 .map(|tile| tile.contributions)
                 .sum::<u64>();
-            let raster = &config.rasterizer;
-            evaluated += draw.evaluations(raster.granularity(mode), raster.hierarchical_depth);
+            evaluated += draw.evaluations(division.granularity(mode), division.hierarchical_depth);
         }
         match evaluated {
             0 => 0.0,
@@ -345,9 +452,9 @@ pub fn even_frame(size: [u32; 2], pairs: u64, contributions: f64) -> FrameWork {
         work.contributions = (work.contributions as f64 * contributions) as u64;
         work
     };
-    let draw = crate::work::DrawWork {
+    let draw = DrawWork {
         tiles: (0..tiles).map(tile).collect(),
-        ..crate::work::DrawWork::default()
+        ..DrawWork::default()
     };
     FrameWork {
         size,
@@ -518,6 +625,45 @@ mod tests {
             let cycles = simulate(&frame, &config).raster.cycles;
             assert!(cycles < last, "{saturation}: {cycles} {last}");
             last = cycles;
+        }
+    }
+    #[test]
+    fn simulations_that_share_a_frame_are_those_of_the_frame_alone() {
+        let mut frame = frame();
+        frame.draws[0].boxed_pairs = 1_700_000;
+        frame.draws[0].sized_pairs = [3_000_000, 1_000_000, 500_000, 200_000];
+        for tile in &mut frame.draws[0].tiles {
+            let needed = tile.listed / 2;
+            tile.runs = vec![crate::work::Run {
+                primitives: needed,
+                rows: 11,
+                blocks: 9,
+                reached: needed * 5,
+                ..crate::work::Run::default()
+            }];
+        }
+        let mut triangles = even_frame([640, 480], 50_000, 0.5).draws.remove(0);
+        triangles.mode = Mode::Triangle;
+        frame.draws.push(triangles);
+        let shared = Shared::new(&frame);
+        let machines = [
+            "modules=15",
+            "modules=3",
+            "batch=17",
+            "saturation=reached",
+            "saturation=row",
+            "triangle_traversal=tile",
+            "tile_side=32",
+            "rasterizer.lists=squares",
+            "baseline.lists=exact",
+            "modules=0",
+            "bandwidth_gb_s=400",
+            "modules=15",
+        ];
+        for setting in machines {
+            let config = Config::preset("paper-15x16", &[setting.to_owned()]).unwrap();
+            let alone = simulate(&frame, &config);
+            assert_eq!(shared.simulate(&config), alone, "{setting}");
         }
     }
 }

@@ -29,6 +29,9 @@ pub struct Trace {
 /// the paper's largest scene has.
 pub const MAX_PAIRS: u64 = 1 << 28;
 
+/// The most tiles of a picture across and down.
+const MAX_TILES_ACROSS: u32 = 1 << 20;
+
 /// The reason that a trace can't be one of a device.
 #[derive(Debug, PartialEq, thiserror::Error)]
 pub enum TraceError {
@@ -58,6 +61,11 @@ pub enum TraceError {
     /// The frame's shader work has a count that is negative or not a number.
     #[error("frame {0}: work of shader cores is negative or no number")]
     ShaderWork(usize),
+    /// The frame has a draw whose boxes touch numbers of tiles that no boxes touch.
+    #[error(
+        "frame {0}: sized_pairs must not grow with the side of a tile, nor shrink by more than four"
+    )]
+    SizedPairs(usize),
 }
 
 impl Trace {
@@ -87,6 +95,9 @@ impl FrameWork {
         let works = draws.flat_map(|draw| [draw.preprocess, draw.sort, draw.shade]);
         if !works.chain([self.compute]).all(|work| work.is_valid()) {
             return Err(TraceError::ShaderWork(frame));
+        }
+        if !self.draws.iter().all(DrawWork::has_possible_boxes) {
+            return Err(TraceError::SizedPairs(frame));
         }
         for tile in self.draws.iter().flat_map(|draw| &draw.tiles) {
             if let Some(what) = tile.contradiction() {
@@ -376,6 +387,12 @@ impl TileWork {
         if self.runs.iter().any(|run| run.hidden > run.primitives) {
             return Some("a run hides more primitives than it has");
         }
+        if self.contributions > u64::from(self.listed) * u64::from(TILE_PIXELS) {
+            return Some("more pixels are changed than its primitives have");
+        }
+        if self.at.iter().any(|&at| at >= MAX_TILES_ACROSS) {
+            return Some("it is in no picture");
+        }
         None
     }
 
@@ -392,7 +409,8 @@ impl TileWork {
 
     /// Pairs of a primitive and a 4x4 block whose depths hide it; see [`Run::hidden_blocks`].
     pub fn hidden_blocks(&self) -> u32 {
-        self.runs.iter().map(|run| run.hidden_blocks).sum()
+        let blocks = self.runs.iter().map(|run| run.hidden_blocks);
+        blocks.fold(0, u32::saturating_add)
     }
 
     /// The parts of the list that hardware of this saturation, with or without hierarchical depth, fetches, in order.
@@ -450,6 +468,16 @@ pub struct Segment {
 }
 
 impl DrawWork {
+    /// True if boxes can touch so many tiles of each size: a tile of the next size has four of the size before. Numbers
+    /// of 0 are unknown.
+    fn has_possible_boxes(&self) -> bool {
+        let pairs = self.sized_pairs.windows(2);
+        let known = pairs.filter(|pair| pair.iter().all(|&count| count > 0));
+        known
+            .into_iter()
+            .all(|pair| pair[1] <= pair[0] && pair[0] <= pair[1].saturating_mul(4))
+    }
+
     /// Pairs of a tile and a primitive in the lists.
     pub fn pairs(&self) -> u64 {
         self.tiles.iter().map(|tile| u64::from(tile.listed)).sum()
@@ -627,8 +655,50 @@ mod tests {
             |tile| tile.runs[0].rows = 17,
             |tile| tile.runs[1].reached = 65,
             |tile| tile.runs[1].hidden = 5,
+            |tile| tile.contributions = 10 * 256 + 1,
+            |tile| tile.contributions = u64::MAX,
+            |tile| tile.at = [0, u32::MAX],
         ] {
             assert!(matches!(check(wrong), Err(TraceError::Tile { .. })));
+        }
+    }
+
+    #[test]
+    fn boxes_that_no_primitives_have_are_refused() {
+        let check = |sized_pairs| {
+            let draw = DrawWork {
+                sized_pairs,
+                ..DrawWork::default()
+            };
+            let frame = FrameWork {
+                draws: vec![draw],
+                ..FrameWork::default()
+            };
+            let (version, frames) = (TRACE_VERSION, vec![frame]);
+            Trace { version, frames }.check()
+        };
+        for right in [[0; 4], [400, 100, 25, 25], [0, 7, 0, 9]] {
+            assert_eq!(check(right), Ok(()), "{right:?}");
+        }
+        for wrong in [[401, 100, 25, 25], [u64::MAX, 1, 1, 1], [7, 8, 8, 8]] {
+            assert_eq!(check(wrong), Err(TraceError::SizedPairs(0)), "{wrong:?}");
+        }
+    }
+
+    #[test]
+    fn shader_work_that_is_no_number_is_refused() {
+        for wrong in [f64::NAN, f64::INFINITY, -1.0, 1e18] {
+            let work = ShaderWork {
+                bytes: wrong,
+                ..ShaderWork::default()
+            };
+            let frame = FrameWork {
+                compute: work,
+                ..FrameWork::default()
+            };
+            let (version, frames) = (TRACE_VERSION, vec![frame]);
+            let checked = Trace { version, frames }.check();
+            assert_eq!(checked, Err(TraceError::ShaderWork(0)), "{wrong}");
         }
     }
 

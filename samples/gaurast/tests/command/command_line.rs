@@ -604,6 +604,111 @@ fn what_cannot_be_simulated_is_said() {
 }
 
 #[gaurast_runner::test]
+fn machines_and_traces_that_cannot_be_are_refused() {
+    let folder = folder();
+    let fails = |arguments: &[&str], message: &str| {
+        fails(&folder, &[&["simulate"], arguments].concat(), message);
+    };
+    for (setting, message) in [
+        (
+            "modules=4097",
+            "rasterizer.modules is 4097; it must be from 0",
+        ),
+        ("modules=-1", "rasterizer.modules is -1; it must be from 0"),
+        ("modules=1.5", "modules=1.5 is not NAME=VALUE"),
+        (
+            "modules=18446744073709551616",
+            "modules=18446744073709551616 is",
+        ),
+        (
+            "numbers_in=4294967295",
+            "rasterizer.numbers_in is 4294967295",
+        ),
+        (
+            "memory.efficiency=100",
+            "memory.efficiency is 100; it must be",
+        ),
+        ("latency_ns=nan", "memory.latency_ns is NaN; it must be"),
+        (
+            "bandwidth_gb_s=1e999",
+            "memory.bandwidth_gb_s is inf; it must",
+        ),
+        ("power_w=", "power_w= is not NAME=VALUE"),
+    ] {
+        fails(&["--set", setting], &format!("gaurast: {message}"));
+    }
+    let traces = [
+        ("", "not a trace of work"),
+        ("[]", "not a trace of work"),
+        (r#"{"version":3,"frames":[]}"#, "there is no frame"),
+        (
+            r#"{"version":4,"frames":[]}"#,
+            "a trace of version 4, not 3",
+        ),
+        (
+            r#"{"version":3,"frames":[{"size":[16,16],"draws":[]}]}"#,
+            "the last frame has no work",
+        ),
+        (
+            r#"{"version":3,"frames":[{"size":[16,16],"draws":[],"compute":{"float":-1}}]}"#,
+            "frame 0: work of shader cores is negative",
+        ),
+        (
+            r#"{"version":3,"frames":[{"size":[16,16],"draws":[],"compute":{"float":NaN}}]}"#,
+            "not a trace of work",
+        ),
+    ];
+    let tiles = [
+        (
+            r#""at":[0,0],"listed":4294967295,"runs":[]"#,
+            "frame 0 has 4294967295 pairs",
+        ),
+        (
+            r#""at":[0,0],"listed":4294967296,"runs":[]"#,
+            "not a trace of work",
+        ),
+        (
+            r#""at":[0,0],"listed":1,"runs":[{"primitives":2,"rows":1,"blocks":1,"reached":1}]"#,
+            "frame 0, tile [0, 0]",
+        ),
+        (
+            r#""at":[0,0],"listed":1,"runs":[{"primitives":1,"rows":17,"blocks":1,"reached":1}]"#,
+            "frame 0, tile [0, 0]",
+        ),
+        (
+            r#""at":[0,4294967295],"listed":1,"runs":[]"#,
+            "frame 0, tile [0, 4294967295]",
+        ),
+    ];
+    let of_tile = |tile: &str| {
+        format!(
+            r#"{{"version":3,"frames":[{{"size":[16,16],"draws":[{{"mode":"gaussian","primitives":1,"drawn":1,
+            "boxed_pairs":0,"preprocess":{{}},"sort":{{}},
+            "tiles":[{{{tile},"contributions":0,"terminated":0}}]}}]}}]}}"#
+        )
+    };
+    let whole = traces.map(|(text, message)| (text.to_owned(), message));
+    let tiles = tiles.map(|(tile, message)| (of_tile(tile), message));
+    for (text, message) in whole.into_iter().chain(tiles) {
+        write(&folder, "trace.json", &text);
+        fails(&["trace.json"], &format!("gaurast: trace.json: {message}"));
+    }
+    // A tile without Gaussians that are needed is simulated.
+    write(
+        &folder,
+        "trace.json",
+        &of_tile(r#""at":[0,0],"listed":1,"runs":[]"#),
+    );
+    let output = gaurast(&folder, &["simulate", "trace.json", "--format", "csv"]);
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(
+        output.status.success() && text.lines().count() == 2,
+        "{text}"
+    );
+    assert!(!text.contains("NaN") && !text.contains("inf"), "{text}");
+}
+
+#[gaurast_runner::test]
 fn the_papers_numbers_are_printed() {
     let folder = folder();
     let output = gaurast(&folder, &["simulate", "--paper"]);

@@ -84,13 +84,12 @@ impl Quads {
 /// beyond the last run, are taken to reach as many blocks as their beginnings.
 fn pixels(draw: &DrawWork) -> f64 {
     let tile = |tile: &timing::work::TileWork| {
-        let reached: u32 = tile
-            .runs
-            .iter()
-            .map(|run| run.reached + run.hidden_blocks)
+        let runs = tile.runs.iter();
+        let reached: u64 = runs
+            .map(|run| u64::from(run.reached) + u64::from(run.hidden_blocks))
             .sum();
         let listed = f64::from(tile.listed) / f64::from(tile.needed().max(1));
-        f64::from(reached) * listed * f64::from(TILE_PIXELS / TILE_GROUPS)
+        reached as f64 * listed * f64::from(TILE_PIXELS / TILE_GROUPS)
     };
     draw.tiles.iter().map(tile).sum()
 }

@@ -113,7 +113,10 @@ pub fn write(folder: &Path) -> Result<()> {
 /// Compiles a top module and its bench with Verilator. Returns the program's path.
 fn build(folder: &Path, top: &str, format: Format, parameters: &[String]) -> Result<PathBuf> {
     write(folder)?;
-    let objects = format!("{top}{}", format.bits());
+    // Each design has a folder of its own, so that none replaces another's program.
+    let letters = |text: &String| text.replace(|c: char| !c.is_alphanumeric(), "");
+    let designs: String = parameters.iter().map(letters).collect();
+    let objects = format!("{top}{}{designs}", format.bits());
     let mut command = Command::new("verilator");
     command
         .current_dir(folder)
@@ -139,7 +142,8 @@ fn build(folder: &Path, top: &str, format: Format, parameters: &[String]) -> Res
         .args(sources());
     match top {
         "units" => command.args(["units.sv", "units.cpp"]),
-        _ => command.arg("bench.cpp"),
+        // Processing elements are compiled once, and not once for each of the module's.
+        _ => command.args(["--hierarchical", "bench.cpp"]),
     };
     let output = command.output()?;
     if !output.status.success() {

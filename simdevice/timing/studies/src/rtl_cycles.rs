@@ -8,6 +8,7 @@ use crate::stepped;
 use std::io::{Error, Result};
 use timing::FrameWork;
 use timing::config::{Config, ConfigError};
+use timing::fast;
 use timing::raster::RasterReport;
 use timing::work::{DrawWork, TileWork};
 
@@ -60,6 +61,9 @@ impl Setting {
 pub struct Cycles {
     rasterized: Rasterized,
     stepped: RasterReport,
+    /// The model's work for the lists, and its machine.
+    frame: FrameWork,
+    config: Config,
     /// The number of pixels in which the two differ.
     pub different_pixels: usize,
     /// The number of lists.
@@ -88,13 +92,24 @@ impl Cycles {
             let pairs = ours.iter().zip(&drawn.pixels);
             pairs.filter(|(ours, theirs)| ours != theirs).count()
         };
+        let frame = frame(lists, &drawn);
         Ok(Self {
             different_pixels: pairs.map(different).sum(),
             tiles: lists.len(),
             latency: rasterized.latency,
-            stepped: stepped::rasterize(&frame(lists, &drawn), &config, 0.0),
+            stepped: stepped::rasterize(&frame, &config, 0.0),
             rasterized,
+            frame,
+            config,
         })
+    }
+
+    /// The error of the model's cycles if `sharing` of the Gaussians that need not wait for the one before do wait; 0.1
+    /// if they are 10 % too many.
+    pub fn error(&self, sharing: f64) -> f64 {
+        let mut config = self.config.clone();
+        config.rasterizer.neighbour_sharing = sharing;
+        fast::rasterize(&self.frame, &config, 0.0).cycles / f64::from(self.rasterized.cycles) - 1.0
     }
 
     /// Cycles of the module and of the model, by cause: all, evaluating a pixel for each PE, waiting for a
@@ -112,6 +127,20 @@ impl Cycles {
             [modes, modules.mode_switch],
         ]
     }
+}
+
+/// The mean error, without its sign, of the model's cycles for some groups of lists.
+pub fn mean_error(groups: &[&Cycles], sharing: f64) -> f64 {
+    let errors = groups.iter().map(|cycles| cycles.error(sharing).abs());
+    errors.sum::<f64>() / groups.len().max(1) as f64
+}
+
+/// The share of waiting Gaussians, in steps of a twentieth, with the least mean error for some groups of lists.
+pub fn calibrated_sharing(groups: &[&Cycles]) -> f64 {
+    let shares = (0..=20).map(|step| f64::from(step) / 20.0);
+    let errors = shares.map(|sharing| (mean_error(groups, sharing), sharing));
+    let best = errors.min_by(|(a, _), (b, _)| a.total_cmp(b));
+    best.map_or(0.0, |(_, sharing)| sharing)
 }
 
 /// A configuration with one module of these numbers, limited only by its port. A list's runs say in which groups its
@@ -144,5 +173,65 @@ fn frame(lists: &[List], drawn: &[Drawn]) -> FrameWork {
         size: [16 * lists.len() as u32, 16],
         draws: lists.iter().zip(drawn).enumerate().map(draw).collect(),
         ..FrameWork::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use timing::work::Run;
+
+    /// Lists of small Gaussians, for which the module takes the model's cycles with `sharing`.
+    fn cycles(sharing: f64, reached: u32) -> Cycles {
+        let config = machine(Format::SINGLE).unwrap();
+        let run = Run {
+            primitives: 600,
+            rows: 16,
+            blocks: 16,
+            reached: 600 * reached,
+            ..Run::default()
+        };
+        let tile = TileWork {
+            listed: 600,
+            runs: vec![run],
+            ..TileWork::default()
+        };
+        let draw = DrawWork {
+            tiles: vec![tile],
+            ..DrawWork::default()
+        };
+        let frame = FrameWork {
+            size: [16, 16],
+            draws: vec![draw],
+            ..FrameWork::default()
+        };
+        let mut of_module = config.clone();
+        of_module.rasterizer.neighbour_sharing = sharing;
+        let report = stepped::rasterize(&frame, &of_module, 0.0);
+        Cycles {
+            rasterized: Rasterized {
+                cycles: report.cycles as u32,
+                causes: [0; 6],
+                latency: 0,
+                pixels: Vec::new(),
+            },
+            stepped: report,
+            different_pixels: 0,
+            tiles: 1,
+            latency: 0,
+            frame,
+            config,
+        }
+    }
+
+    #[test]
+    fn the_share_that_made_the_cycles_is_found_again() {
+        // Gaussians in one block wait up to six cycles: a sixth more or less is seen.
+        let (few, many) = (cycles(0.5, 1), cycles(0.5, 1));
+        assert!(mean_error(&[&few, &many], 0.5) < 1e-9);
+        assert!((calibrated_sharing(&[&few, &many]) - 0.5).abs() < 0.1);
+        assert!(calibrated_sharing(&[&cycles(1.0, 1)]) > 0.9);
+        assert_eq!(calibrated_sharing(&[&cycles(0.0, 1)]), 0.0);
+        assert!(few.error(1.0) > 0.1 && few.error(0.0) < -0.1);
     }
 }

@@ -16,14 +16,14 @@ pub struct Axis {
     pub logarithmic: bool,
 }
 
-/// A named point. The name is written at the point, or shown as a tooltip.
+/// A named point. The name is shown as a tooltip.
 #[derive(Clone, Debug)]
 pub struct Point {
     /// The horizontal and the vertical value.
     pub at: [f64; 2],
     /// Its name.
     pub name: String,
-    /// True if the name is written at the point.
+    /// True if the name is also written at the point, if there is room.
     pub labelled: bool,
     /// A colour of SVG.
     pub color: &'static str,
@@ -115,7 +115,8 @@ impl Axis {
 /// The name of a power of ten.
 fn decade(power: i32) -> String {
     match power {
-        0..=3 => format!("{}", 10i64.pow(power as u32)),
+        0..=4 => format!("{}", 10i64.pow(power as u32)),
+        -3..0 => format!("{}", 10f64.powi(power)),
         _ => format!("1e{power}"),
     }
 }
@@ -125,6 +126,71 @@ fn escaped(text: &str) -> String {
     text.replace('&', "&amp;")
         .replace('<', "&lt;")
         .replace('>', "&gt;")
+}
+
+/// The approximate width of a letter and the height of a line of text, in pixels.
+const LETTER: [f64; 2] = [6.4, 12.0];
+
+/// A rectangle in pixels: left, top, right, bottom.
+type Rectangle = [f64; 4];
+
+/// The places of a plot that are taken, so that no text is written over them.
+struct Taken {
+    /// The rectangle between the axes, and to the right edge of the picture.
+    within: Rectangle,
+    rectangles: Vec<Rectangle>,
+}
+
+impl Taken {
+    fn is_free(&self, [left, top, right, bottom]: Rectangle) -> bool {
+        let [low, high, far, deep] = self.within;
+        let apart = |&[a, b, c, d]: &Rectangle| right < a || c < left || bottom < b || d < top;
+        left >= low
+            && top >= high
+            && right <= far
+            && bottom <= deep
+            && self.rectangles.iter().all(apart)
+    }
+
+    /// Takes the places of a line's pieces.
+    fn line(&mut self, from: [f64; 2], to: [f64; 2]) {
+        const PIECE: f64 = 6.0;
+        let [dx, dy] = [to[0] - from[0], to[1] - from[1]];
+        let count = (dx.hypot(dy) / PIECE).ceil().clamp(1.0, 1000.0);
+        for piece in 0..=count as u32 {
+            let share = f64::from(piece) / count;
+            self.around([from[0] + share * dx, from[1] + share * dy], 1.0);
+        }
+    }
+
+    /// Takes the places within a distance of a point, across and up.
+    fn around(&mut self, [x, y]: [f64; 2], distance: f64) {
+        self.rectangles
+            .push([x - distance, y - distance, x + distance, y + distance]);
+    }
+
+    /// Takes the nearest free place for a text at a point, and returns its anchor and the begin of its baseline or, if
+    /// it is to the left of the point, the end. None if there is no room.
+    fn text(&mut self, [x, y]: [f64; 2], letters: usize) -> Option<(&'static str, [f64; 2])> {
+        let [width, height] = [LETTER[0] * letters as f64, LETTER[1]];
+        for line in 0..4 {
+            let further = 15.0 * f64::from(line);
+            for baseline in [y - 6.0 - further, y + 15.0 + further] {
+                for (anchor, begin, end) in [
+                    ("start", x + 6.0, x + 6.0 + width),
+                    ("end", x - 6.0 - width, x - 6.0),
+                ] {
+                    let rectangle = [begin, baseline - height + 2.0, end, baseline + 3.0];
+                    if self.is_free(rectangle) {
+                        self.rectangles.push(rectangle);
+                        let at = if anchor == "start" { begin } else { end };
+                        return Some((anchor, [at, baseline]));
+                    }
+                }
+            }
+        }
+        None
+    }
 }
 
 impl Plot {
@@ -189,6 +255,13 @@ impl Plot {
             let [across, up] = [self.axes[0].place(at[0]), self.axes[1].place(at[1])];
             (across.is_finite() && up.is_finite()).then(|| [x(across), y(up)])
         };
+        let mut taken = Taken {
+            within: [left, 0.0, width, base],
+            rectangles: Vec::new(),
+        };
+        for point in self.points.iter().filter_map(|point| place(point.at)) {
+            taken.around(point, 4.0);
+        }
         for Line {
             through,
             name,
@@ -205,8 +278,15 @@ impl Plot {
                 "<polyline points=\"{}\" stroke=\"{color}\" stroke-width=\"2\" fill=\"none\"/>",
                 text.join(" ")
             )?;
-            if let Some([x, y]) = places.last() {
-                let (y, name) = (y - 6.0, escaped(name));
+            for pair in places.windows(2) {
+                taken.line(pair[0], pair[1]);
+            }
+            if let Some(&[x, y]) = places.last() {
+                let y = y - 6.0;
+                let letters = name.chars().count() as f64;
+                let begin = x - LETTER[0] * letters;
+                taken.rectangles.push([begin, y - LETTER[1], x, y + 3.0]);
+                let name = escaped(name);
                 writeln!(
                     out,
                     "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"end\" fill=\"{color}\">{name}</text>"
@@ -222,9 +302,14 @@ impl Plot {
                 out,
                 "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\" fill=\"{color}\"><title>{name}</title></circle>"
             )?;
-            if point.labelled {
-                let (x, y) = (x + 6.0, y - 6.0);
-                writeln!(out, "<text x=\"{x:.1}\" y=\"{y:.1}\">{name}</text>")?;
+            let letters = point.name.chars().count();
+            if point.labelled
+                && let Some((anchor, [x, y])) = taken.text([x, y], letters)
+            {
+                writeln!(
+                    out,
+                    "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{name}</text>"
+                )?;
             }
         }
         let (middle, low) = ((left + end) / 2.0, height - 10.0);
@@ -308,5 +393,69 @@ mod tests {
             assert!(svg.contains(&format!(">{mark}</text>")), "{mark}");
         }
         assert!(!svg.contains("NaN") && !svg.contains("inf"));
+    }
+
+    #[test]
+    fn names_are_not_written_over_each_other_nor_over_points() {
+        let axis = || Axis {
+            name: String::new(),
+            logarithmic: false,
+        };
+        let point = |index: u32| Point {
+            at: [f64::from(index / 4), f64::from(index % 4) * 1e-3],
+            name: format!("machine {index}"),
+            labelled: true,
+            color: "red",
+        };
+        let plot = Plot {
+            size: [500, 300],
+            axes: [axis(), axis()],
+            points: (0..40).map(point).collect(),
+            lines: Vec::new(),
+        };
+        let svg = plot.svg();
+        let numbers = |line: &str, names: [&str; 2]| {
+            names.map(|name| -> f64 {
+                let (_, rest) = line.split_once(&format!(" {name}=\"")).expect("a number");
+                let (number, _) = rest.split_once('"').expect("a quote");
+                number.parse().expect("a number")
+            })
+        };
+        let circles: Vec<_> = svg
+            .lines()
+            .filter(|line| line.starts_with("<circle"))
+            .map(|line| numbers(line, ["cx", "cy"]))
+            .collect();
+        assert_eq!(circles.len(), 40);
+        let texts: Vec<_> = svg
+            .lines()
+            .filter(|line| line.contains(">machine") && line.starts_with("<text"))
+            .map(|line| {
+                let [x, y] = numbers(line, ["x", "y"]);
+                let letters = line.split(['<', '>']).nth(2).map_or(0, str::len);
+                let width = LETTER[0] * letters as f64;
+                let left = if line.contains("\"end\"") {
+                    x - width
+                } else {
+                    x
+                };
+                [left, y - 9.0, left + width, y]
+            })
+            .collect();
+        // There is room for some, and not for all.
+        assert!((5..40).contains(&texts.len()), "{}", texts.len());
+        let meet =
+            |a: &[f64; 4], b: &[f64; 4]| a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3];
+        for (index, text) in texts.iter().enumerate() {
+            assert!(!texts[..index].iter().any(|other| meet(text, other)));
+            let on = |&[x, y]: &[f64; 2]| meet(text, &[x - 3.0, y - 3.0, x + 3.0, y + 3.0]);
+            assert!(!circles.iter().any(on));
+        }
+    }
+
+    #[test]
+    fn small_powers_of_ten_are_written_out() {
+        let names = [-4, -3, -1, 0, 4, 5].map(decade);
+        assert_eq!(names, ["1e-4", "0.001", "0.1", "1", "10000", "1e5"]);
     }
 }

@@ -2,7 +2,7 @@
 //! which a larger number brings little.
 
 use crate::chart::{self, Chart, Corner, Curve, Mark};
-use crate::scene;
+use crate::{rivals, scene, simt};
 use std::fmt::Write;
 use timing::config::{Config, ConfigError, DEFAULT_PRESET};
 use timing::simulate::{Simulation, simulate};
@@ -366,5 +366,40 @@ pub fn markdown() -> Result<String, ConfigError> {
         out += &sweep.why;
         out += "\n";
     }
+    out += &baselines(&frame)?;
+    Ok(out)
+}
+
+/// The section of the same scene's stage 3 on other machines.
+fn baselines(frame: &FrameWork) -> Result<String, ConfigError> {
+    let config = Config::preset(DEFAULT_PRESET, &[])?;
+    let result = simulate(frame, &config);
+    let threads = simt::simulate(&frame.with_squares(), &config);
+    let quads = rivals::quads(frame, &config);
+    let ours = result.stages_alone.raster;
+    let rows = [
+        ("Gaussian mode, a frame alone", ours),
+        ("shader cores, calibrated", result.baseline_raster_ms),
+        ("shader cores, SIMT machine", threads.milliseconds()),
+        (
+            "blended quads on the plain rasterizer",
+            quads.milliseconds(),
+        ),
+    ];
+    let mut out =
+        "\n## Other machines\n\n| stage 3 | ms | over the Gaussian mode |\n|---|---:|---:|\n"
+            .to_owned();
+    for (name, ms) in rows {
+        // Writing to a string cannot fail.
+        let _ = writeln!(out, "| {name} | {ms:.3} | {:.1}x |", ms / ours);
+    }
+    let _ = write!(
+        out,
+        "\nThe shader cores draw the lists of 3-sigma squares, as the original code does. The calibrated number of \
+         operations an evaluation comes from the paper's times; the SIMT machine (`studies/src/simt.rs`) has none of them: \
+         {:.0} % of its warps blend. Quads are never spared, and {} limits them.\n",
+        100.0 * threads.blended,
+        quads.limit(),
+    );
     Ok(out)
 }

@@ -165,7 +165,7 @@ fn open_warps(run: &Run) -> f64 {
 /// square, of which each row is two warps. It is an estimate, because the trace has blocks and not rows.
 fn blending(run: &Run) -> f64 {
     let primitives = f64::from(run.primitives.max(1));
-    let blocks = f64::from(run.reached + run.hidden_blocks) / primitives;
+    let blocks = (f64::from(run.reached) + f64::from(run.hidden_blocks)) / primitives;
     let rows = blocks.sqrt().min(4.0);
     (2.0 * rows / open_warps(run).max(1.0)).min(1.0)
 }

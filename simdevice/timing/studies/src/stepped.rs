@@ -3,13 +3,13 @@
 
 use std::collections::VecDeque;
 use timing::config::Config;
-use timing::plan::{self, Part, Rates, Task};
+use timing::plan::{self, Division, Part, Rates, Task};
 use timing::raster::{ModuleCycles, RasterReport};
 use timing::work::{FrameWork, Mode};
 
 /// Rasterizes a frame, cycle by cycle, while other units move `others_gb_s` to and from main memory.
 pub fn rasterize(frame: &FrameWork, config: &Config, others_gb_s: f64) -> RasterReport {
-    let tasks = plan::tasks(frame, &config.rasterizer);
+    let tasks = plan::tasks(frame, &Division::of(&config.rasterizer));
     let rates = Rates::new(config, others_gb_s);
     let mut report = RasterReport::default();
     let mut queue = tasks.iter();

@@ -3,6 +3,7 @@
 
 mod calibration;
 mod generated;
+mod glance;
 mod headlines;
 mod numbers;
 mod predicted;
@@ -10,9 +11,11 @@ mod rivals;
 mod scenes;
 mod table;
 
+pub use glance::TITLE as AT_A_GLANCE;
 pub use table::{Label, Row, Section};
 
-/// The whole report: predicted numbers first, then solved and calibrated ones, then the inputs.
+/// The whole report. The first section has the main rows of the others. Of these, predicted numbers come first, then
+/// solved and calibrated ones, then the inputs.
 pub fn report() -> Vec<Section> {
     let mut sections: Vec<_> = predicted::section().into_iter().collect();
     sections.push(scenes::left_out());
@@ -21,6 +24,7 @@ pub fn report() -> Vec<Section> {
     sections.extend(scenes::sections());
     sections.push(numbers::inputs());
     sections.extend(generated::section());
+    sections.insert(0, glance::section(&sections));
     sections
 }
 
