@@ -36,23 +36,28 @@ pub(crate) struct TileFootprint {
     held: [u32; HELD_ROWS],
 }
 
-/// A span as a number: its first tile in the low 16 bits, its end in the high 16 bits.
+/// The bits of a [`PackedSpan`] that hold its first tile. A row has at most 4096 tiles.
+pub(crate) const FIRST_TILE_BITS: u32 = 19;
+
+/// A span as a number: its first tile in the low [`FIRST_TILE_BITS`] bits, the number of its tiles in the others. If
+/// a number is added to it, the first tile moves on by as much, as long as it fits into its bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct PackedSpan(u32);
 
 impl From<TileSpan> for PackedSpan {
     #[inline(always)]
     fn from(span: TileSpan) -> Self {
-        Self(u32::from(span.first) | u32::from(span.end) << 16)
+        Self(u32::from(span.first) | (span.len() as u32) << FIRST_TILE_BITS)
     }
 }
 
 impl From<PackedSpan> for TileSpan {
     #[inline(always)]
-    fn from(PackedSpan(bits): PackedSpan) -> Self {
+    fn from(span: PackedSpan) -> Self {
+        let [first, end] = span.tiles();
         Self {
-            first: bits as u16,
-            end: (bits >> 16) as u16,
+            first: first as u16,
+            end: end as u16,
         }
     }
 }
@@ -62,6 +67,26 @@ impl PackedSpan {
     #[inline(always)]
     pub(super) fn from_bits(bits: u32) -> Self {
         Self(bits)
+    }
+
+    /// True if it has no tiles.
+    #[inline(always)]
+    pub(super) fn is_empty(self) -> bool {
+        self.0 >> FIRST_TILE_BITS == 0
+    }
+
+    /// The span whose tiles have numbers that are greater by `tiles`. The sum must fit into [`FIRST_TILE_BITS`] bits,
+    /// unless the span has no tiles.
+    #[inline(always)]
+    pub(super) fn moved_by(self, tiles: u32) -> Self {
+        Self(self.0.wrapping_add(tiles))
+    }
+
+    /// The first tile, and one past the last.
+    #[inline(always)]
+    pub(super) fn tiles(self) -> [u32; 2] {
+        let first = self.0 & ((1 << FIRST_TILE_BITS) - 1);
+        [first, first + (self.0 >> FIRST_TILE_BITS)]
     }
 }
 

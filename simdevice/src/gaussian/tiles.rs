@@ -2,7 +2,7 @@
 //! most are; for several rows of one Gaussian at once if it is tall; and one at a time otherwise.
 
 use super::camera::ViewConstants;
-use super::footprint::{Ellipse, HELD_ROWS, PackedSpan, TileFootprint, TileSpan};
+use super::footprint::{Ellipse, FIRST_TILE_BITS, HELD_ROWS, PackedSpan, TileFootprint, TileSpan};
 use super::lanes::{Bits, GroupF64};
 use super::panorama;
 use super::scratch::{Scratch, ScreenGaussians};
@@ -67,7 +67,7 @@ impl<S: Simd> Range<S> {
     /// The span of its tiles, as the number whose bits are a [`PackedSpan`].
     #[inline(always)]
     fn span(&self) -> S::f64s {
-        self.first + (self.last + 1.0) * 65536.0
+        self.first + self.tiles() * f64::from(1u32 << FIRST_TILE_BITS)
     }
 }
 
