@@ -16,7 +16,9 @@ use super::lanes::{Bits, F32_LANES, GROUP, GroupF64, log2};
 use super::ray_depth::RayDepth;
 use super::scratch::{Scratch, ScreenGaussians};
 use super::sort::ordered_bits;
-use super::spherical_harmonics::{Bases, COEFFICIENT_FLOATS, DIRECTIONS, coefficient_count};
+use super::spherical_harmonics::{
+    Bases, COEFFICIENT_FLOATS, DIRECTIONS, MAX_COEFFICIENTS, coefficient_count,
+};
 use super::splat::{ProjectedGroup, Splat, are_steep, binary16_headroom};
 use super::surfel::surfel_of;
 use super::tiles::find_tiles;
@@ -53,6 +55,21 @@ pub(super) struct Source<'a> {
 }
 
 impl Source<'_> {
+    /// Reads the spherical harmonics of a lane into `read`, and zeros where the draw has fewer, and returns `read`.
+    #[inline(never)]
+    fn read_harmonics<'b>(
+        &self,
+        lane: usize,
+        read: &'b mut [f32; COEFFICIENT_FLOATS],
+    ) -> &'b [f32] {
+        let floats = self.reader.floats();
+        match self.harmonics.from(lane).get(..floats) {
+            Some(last) if floats > 0 => read[..floats].copy_from_slice(last),
+            _ => self.reader.read(&self.group, lane, read),
+        }
+        read
+    }
+
     /// Starts to load the spherical harmonics of degrees 0 to `degree` into the processor's cache, for the lanes that
     /// have a bit in `kept`.
     #[inline(always)]
@@ -76,14 +93,23 @@ impl Source<'_> {
     }
 }
 
-/// Projects a group and appends the result to `out`. `sequence` maps a lane to its Gaussian's number in the set.
+/// The numbers in the set of a group's Gaussians.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Sequence<'a> {
+    /// Consecutive numbers, from this one on.
+    From(u32),
+    /// These numbers, counted from the first one.
+    Listed(u32, &'a [u32]),
+}
+
+/// Projects a group and appends the result to `out`.
 #[inline(always)]
 pub(super) fn project<S: Simd>(
     view: &ViewConstants,
     simd: S,
     source: &Source<'_>,
     scratch: &mut Scratch,
-    sequence: impl Fn(usize) -> u32,
+    sequence: Sequence<'_>,
     out: &mut ProjectedGroup,
 ) {
     let counters = &mut out.counters;
@@ -456,10 +482,19 @@ fn center_depth(view: &ViewConstants, at: usize, scratch: &Scratch) -> u32 {
 
 /// Computes the sort key and the sequence number of each kept lane.
 #[inline(always)]
-fn find_keys(view: &ViewConstants, sequence: impl Fn(usize) -> u32, scratch: &mut Scratch) {
+fn find_keys(view: &ViewConstants, sequence: Sequence<'_>, scratch: &mut Scratch) {
     let [keys, sequences] = &mut *scratch.keys;
-    for (to, &lane) in sequences.iter_mut().zip(&scratch.lanes) {
-        *to = sequence(lane);
+    let to_lanes = sequences.iter_mut().zip(&scratch.lanes);
+    match sequence {
+        Sequence::From(first) => to_lanes.for_each(|(to, &lane)| *to = first + lane as u32),
+        // All lanes are there, in order.
+        Sequence::Listed(first, numbers) if numbers.len() == scratch.lanes.len() => {
+            let to_lanes = sequences.iter_mut().zip(numbers);
+            to_lanes.for_each(|(to, &number)| *to = first + number);
+        }
+        Sequence::Listed(first, numbers) => {
+            to_lanes.for_each(|(to, &lane)| *to = first + numbers[lane]);
+        }
     }
     match view.order {
         GaussianOrder::ViewDepth => {
@@ -502,13 +537,12 @@ pub(super) fn emit<S: Simd>(
     simd: S,
     source: &Source<'_>,
     scratch: &mut Scratch,
-    sequence: impl Fn(usize) -> u32,
+    sequence: Sequence<'_>,
     out: &mut ProjectedGroup,
 ) {
     out.reserve(scratch.lanes.len());
     find_tiles(view, simd, scratch, out);
     find_keys(view, sequence, scratch);
-    let reader = &source.reader;
     let degree = view.sh_degree;
     #[cfg(feature = "mistakes")]
     let degree = if Mistake::NoDegree4.is_made() {
@@ -516,9 +550,8 @@ pub(super) fn emit<S: Simd>(
     } else {
         degree
     };
-    let floats = reader.floats();
-    let mut read = [0.0; COEFFICIENT_FLOATS];
     let (mut directions, mut bases) = ([[0.0; DIRECTIONS]; 3], Bases::default());
+    let mut read = [0.0; COEFFICIENT_FLOATS];
     let mut copies = &*scratch.copies;
     for group in scratch.reached.chunks(DIRECTIONS) {
         for (parts, lanes) in directions.iter_mut().zip(&scratch.flat.direction) {
@@ -531,27 +564,17 @@ pub(super) fn emit<S: Simd>(
             }
         }
         bases.find(simd, degree, &directions);
-        let needed = 3 * coefficient_count(degree) + 1;
-        let is_whole = floats + 1 >= needed;
         // All colours are computed first, so that their reads from memory overlap.
-        let mut colored = Colored::default();
-        for (number, &at) in group.iter().enumerate() {
-            let lane = scratch.lanes[at % GROUP];
-            let rest = source.harmonics.from(lane);
-            let coefficients = if is_whole && rest.len() >= needed {
-                rest
-            } else {
-                match rest.get(..floats) {
-                    Some(last) if floats > 0 => read[..floats].copy_from_slice(last),
-                    _ => reader.read(&source.group, lane, &mut read),
-                }
-                &read
-            };
-            match bases.color(simd, degree, number, coefficients) {
-                Some(color) => colored.push(at, color),
-                None => out.counters.add(Counter::SkippedNonFinite, 1),
-            }
-        }
+        let lanes = &*scratch.lanes;
+        let colored = match degree {
+            0 => color::<S, 1>(simd, source, lanes, group, &bases, &mut read),
+            1 => color::<S, 4>(simd, source, lanes, group, &bases, &mut read),
+            2 => color::<S, 9>(simd, source, lanes, group, &bases, &mut read),
+            3 => color::<S, 16>(simd, source, lanes, group, &bases, &mut read),
+            _ => color::<S, MAX_COEFFICIENTS>(simd, source, lanes, group, &bases, &mut read),
+        };
+        let uncolored = group.len() - colored.all().len();
+        out.counters.add(Counter::SkippedNonFinite, uncolored as u64);
         let Some(period) = view.period else {
             append(view, colored.all(), scratch, out);
             continue;
@@ -638,7 +661,6 @@ impl ColoredLane {
 }
 
 /// The coloured lanes of a batch of directions.
-#[derive(Default)]
 struct Colored {
     lanes: [ColoredLane; DIRECTIONS],
     len: usize,
@@ -646,17 +668,48 @@ struct Colored {
 
 impl Colored {
     #[inline(always)]
-    fn push(&mut self, at: usize, color: [f32; 4]) {
-        self.lanes[self.len % DIRECTIONS] = ColoredLane {
-            at: at % GROUP,
-            color,
-        };
-        self.len += 1;
-    }
-
-    #[inline(always)]
     fn all(&self) -> &[ColoredLane] {
         &self.lanes[..self.len.min(DIRECTIONS)]
+    }
+}
+
+/// Computes the colours of a batch of elements from `COUNT` coefficients each, in the directions of `bases`. Elements
+/// whose coefficients are not finite are left out. `lanes` are the elements' lanes, and `read` is scratch, of zeros where
+/// the draw has no coefficients.
+#[inline(always)]
+fn color<S: Simd, const COUNT: usize>(
+    simd: S,
+    source: &Source<'_>,
+    lanes: &[usize],
+    batch: &[usize],
+    bases: &Bases,
+    read: &mut [f32; COEFFICIENT_FLOATS],
+) -> Colored {
+    let mut colored = [ColoredLane::default(); DIRECTIONS];
+    let mut len = 0;
+    // One more than there are, since vectors have four numbers and coefficients three.
+    let needed = 3 * COUNT + 1;
+    let held = if source.reader.floats() + 1 >= needed {
+        source.harmonics
+    } else {
+        Harmonics::default()
+    };
+    for (number, &at) in batch.iter().enumerate() {
+        let lane = lanes[at % GROUP];
+        let coefficients = match held.first(lane, needed) {
+            Some(coefficients) => coefficients,
+            None => source.read_harmonics(lane, read),
+        };
+        if let Some(color) = bases.color_of::<S, COUNT>(simd, number, coefficients) {
+            let to = &mut colored[len % DIRECTIONS];
+            to.at = at % GROUP;
+            color.store_slice(&mut to.color);
+            len += 1;
+        }
+    }
+    Colored {
+        lanes: colored,
+        len,
     }
 }
 
@@ -834,9 +887,9 @@ impl Preprocessor<'_> {
             frustum: bounds,
             ..source
         };
-        let sequence = |lane: usize| match &task.part {
-            GroupSource::From(start) => task.sequence + start + lane as u32,
-            GroupSource::Cluster(cluster) => task.sequence + cluster.numbers[lane],
+        let sequence = match task.part {
+            GroupSource::From(start) => Sequence::From(task.sequence + start),
+            GroupSource::Cluster(cluster) => Sequence::Listed(task.sequence, &cluster.numbers),
         };
         dispatch!(self.runtime.level(), simd => project(constants, simd, &source, scratch, sequence, &mut out));
         out
