@@ -25,6 +25,9 @@ impl TileSpan {
 /// The most rows of tiles whose spans a [`TileFootprint`] stores inline.
 pub(crate) const HELD_ROWS: usize = 3;
 
+/// The number of words of a [`TileFootprint`].
+pub(super) const FOOTPRINT_WORDS: usize = 1 + HELD_ROWS;
+
 /// The tiles that a Gaussian reaches: a span for each of some consecutive rows of tiles. It is small, since most
 /// Gaussians reach few tiles, and all of them are read in depth order.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -107,21 +110,17 @@ impl TileFootprint {
         reach
     }
 
-    /// The footprint as two 64-bit words, for storage.
+    /// The footprint as words, for storage: its rows, then its spans.
     #[inline(always)]
-    pub(super) fn words(&self) -> [u64; 2] {
-        let both = |low: u32, high: u32| u64::from(low) | u64::from(high) << 32;
+    pub(super) fn words(&self) -> [u32; FOOTPRINT_WORDS] {
         let [first, second, third] = self.held;
-        [both(self.rows, first), both(second, third)]
+        [self.rows, first, second, third]
     }
 
     /// The footprint that [`TileFootprint::words`] made these words of.
     #[inline(always)]
-    pub(super) fn from_words([first, second]: [u64; 2]) -> Self {
-        Self {
-            rows: first as u32,
-            held: [(first >> 32) as u32, second as u32, (second >> 32) as u32],
-        }
+    pub(super) fn from_words([rows, held @ ..]: [u32; FOOTPRINT_WORDS]) -> Self {
+        Self { rows, held }
     }
 
     /// The first row.
