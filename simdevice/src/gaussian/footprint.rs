@@ -32,11 +32,9 @@ pub(super) const FOOTPRINT_WORDS: usize = 1 + HELD_ROWS;
 /// Gaussians reach few tiles, and all of them are read in depth order.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct TileFootprint {
-    /// The first row (low 16 bits) and the number of rows (high 16 bits).
-    rows: u32,
-    /// The packed spans of the rows, if they fit. Otherwise the first word is the index of the first row's span in the
-    /// group's list of spans.
-    held: [u32; HELD_ROWS],
+    /// The first row (low 16 bits) and the number of rows (high 16 bits), and then the packed spans of the rows, if they
+    /// fit. Otherwise the second word is the index of the first row's span in the group's list of spans.
+    words: [u32; FOOTPRINT_WORDS],
 }
 
 /// The bits of a [`PackedSpan`] that hold its first tile. A row has at most 4096 tiles.
@@ -72,10 +70,16 @@ impl PackedSpan {
         Self(bits)
     }
 
+    /// The number of tiles.
+    #[inline(always)]
+    pub(super) fn len(self) -> u32 {
+        self.0 >> FIRST_TILE_BITS
+    }
+
     /// True if it has no tiles.
     #[inline(always)]
     pub(super) fn is_empty(self) -> bool {
-        self.0 >> FIRST_TILE_BITS == 0
+        self.len() == 0
     }
 
     /// The span whose tiles have numbers that are greater by `tiles`. The sum must fit into [`FIRST_TILE_BITS`] bits,
@@ -89,7 +93,7 @@ impl PackedSpan {
     #[inline(always)]
     pub(super) fn tiles(self) -> [u32; 2] {
         let first = self.0 & ((1 << FIRST_TILE_BITS) - 1);
-        [first, first + (self.0 >> FIRST_TILE_BITS)]
+        [first, first + self.len()]
     }
 }
 
@@ -98,41 +102,38 @@ impl TileFootprint {
     /// extended by them.
     #[inline(always)]
     pub(crate) fn new(row: u16, rows: u16, others: &mut Vec<TileSpan>) -> Self {
-        let mut reach = Self {
-            rows: u32::from(row) | u32::from(rows) << 16,
-            held: [0; HELD_ROWS],
-        };
+        let mut words = [0; FOOTPRINT_WORDS];
+        words[0] = u32::from(row) | u32::from(rows) << 16;
         if usize::from(rows) > HELD_ROWS {
-            reach.held[0] = others.len() as u32;
+            words[1] = others.len() as u32;
             let len = others.len() + usize::from(rows);
             host::resize(others, len, TileSpan::default());
         }
-        reach
+        Self { words }
     }
 
     /// The footprint as words, for storage: its rows, then its spans.
     #[inline(always)]
     pub(super) fn words(&self) -> [u32; FOOTPRINT_WORDS] {
-        let [first, second, third] = self.held;
-        [self.rows, first, second, third]
+        self.words
     }
 
     /// The footprint that [`TileFootprint::words`] made these words of.
     #[inline(always)]
-    pub(super) fn from_words([rows, held @ ..]: [u32; FOOTPRINT_WORDS]) -> Self {
-        Self { rows, held }
+    pub(super) fn from_words(words: [u32; FOOTPRINT_WORDS]) -> Self {
+        Self { words }
     }
 
     /// The first row.
     #[inline(always)]
     fn row(&self) -> u32 {
-        self.rows & 0xFFFF
+        self.words[0] & 0xFFFF
     }
 
     /// The number of rows.
     #[inline(always)]
     fn len(&self) -> usize {
-        (self.rows >> 16) as usize
+        (self.words[0] >> 16) as usize
     }
 
     /// Sets the span of its row `number`, counted from its first row.
@@ -140,9 +141,9 @@ impl TileFootprint {
     pub(crate) fn set(&mut self, others: &mut [TileSpan], number: u16, span: TileSpan) {
         let at = usize::from(number);
         if self.len() > HELD_ROWS {
-            others[self.held[0] as usize + at] = span;
+            others[self.words[1] as usize + at] = span;
         } else {
-            self.held[at % HELD_ROWS] = PackedSpan::from(span).0;
+            self.words[1 + at % HELD_ROWS] = PackedSpan::from(span).0;
         }
     }
 
@@ -159,9 +160,9 @@ impl TileFootprint {
     #[inline(always)]
     fn span(&self, others: &[TileSpan], number: usize) -> TileSpan {
         if self.len() > HELD_ROWS {
-            others[self.held[0] as usize + number]
+            others[self.words[1] as usize + number]
         } else {
-            PackedSpan(self.held[number]).into()
+            PackedSpan(self.words[1 + number]).into()
         }
     }
 
@@ -180,7 +181,8 @@ impl TileFootprint {
     /// `None` if the spans are in the group's list.
     #[inline(always)]
     pub(crate) fn held(&self) -> Option<(u32, [PackedSpan; HELD_ROWS])> {
-        (self.len() <= HELD_ROWS).then(|| (self.row(), self.held.map(PackedSpan)))
+        let [_, held @ ..] = self.words;
+        (self.len() <= HELD_ROWS).then(|| (self.row(), held.map(PackedSpan)))
     }
 }
 

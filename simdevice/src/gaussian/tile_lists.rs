@@ -506,6 +506,7 @@ impl RowBand {
         for runs in runs {
             for &run in *runs {
                 let [first, end] = run.tiles();
+                let count = run.tiles.len();
                 // Most runs have one tile or two, which is hard to predict. An unwanted entry is overwritten by the
                 // next.
                 let mut put = |tile: usize, wanted: bool| {
@@ -514,9 +515,9 @@ impl RowBand {
                     ends[tile] = end + u32::from(wanted);
                 };
                 put(first, true);
-                put(first + 1, first + 1 < end);
-                for tile in first + 2..end {
-                    put(tile, true);
+                put(first + 1, count > 1);
+                if count > 2 {
+                    (first + 2..end).for_each(|tile| put(tile, true));
                 }
             }
         }
