@@ -381,6 +381,13 @@ impl<'a> Harmonics<'a> {
         self.floats.get(lane * self.stride..).unwrap_or_default()
     }
 
+    /// The given lane's first `count` floats and those after it, if there are so many.
+    #[inline(always)]
+    pub(super) fn first(&self, lane: usize, count: usize) -> Option<&'a [f32]> {
+        let start = lane * self.stride;
+        self.floats.get(start..start + count)
+    }
+
     /// The floats of a range of lanes, if they are held and a lane has at most `most`.
     #[inline(always)]
     pub(super) fn of_all(&self, lanes: RangeInclusive<usize>, most: usize) -> Option<&'a [f32]> {

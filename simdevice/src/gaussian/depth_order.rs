@@ -1,18 +1,23 @@
 //! The depth order of a set: a stable sort by depth key. Equal keys keep the order of the draw.
 
 use super::lanes::GROUP;
-use super::sort;
+use super::sort::{self, SortBuffers, SortedPairs};
 use super::splat::{ProjectedGroup, locate};
 use devmem::host;
 
 /// A depth key, and the index of a splat that [`locate`] takes apart.
 type Pair = (u32, u32);
 
-/// The projected Gaussians in depth order: key, and group number times `GROUP` plus lane.
-pub(super) fn sorted(groups: &[ProjectedGroup], workers: usize) -> Vec<Pair> {
+/// The projected Gaussians in depth order: key, and group number times `GROUP` plus lane. The memory comes from
+/// `buffers`.
+pub(super) fn sorted(
+    groups: &[ProjectedGroup],
+    workers: usize,
+    buffers: &SortBuffers,
+) -> SortedPairs {
     let keys = keys_of(groups);
     let settle = |pairs: &mut [Pair]| settle_ties(&keys, pairs);
-    sort::sort_lists(&keys, GROUP as u32, workers, settle)
+    sort::sort_lists(&keys, GROUP as u32, workers, buffers, settle)
 }
 
 /// The keys of each group.

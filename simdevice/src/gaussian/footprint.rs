@@ -25,34 +25,40 @@ impl TileSpan {
 /// The most rows of tiles whose spans a [`TileFootprint`] stores inline.
 pub(crate) const HELD_ROWS: usize = 3;
 
+/// The number of words of a [`TileFootprint`].
+pub(super) const FOOTPRINT_WORDS: usize = 1 + HELD_ROWS;
+
 /// The tiles that a Gaussian reaches: a span for each of some consecutive rows of tiles. It is small, since most
 /// Gaussians reach few tiles, and all of them are read in depth order.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct TileFootprint {
-    /// The first row (low 16 bits) and the number of rows (high 16 bits).
-    rows: u32,
-    /// The packed spans of the rows, if they fit. Otherwise the first word is the index of the first row's span in the
-    /// group's list of spans.
-    held: [u32; HELD_ROWS],
+    /// The first row (low 16 bits) and the number of rows (high 16 bits), and then the packed spans of the rows, if they
+    /// fit. Otherwise the second word is the index of the first row's span in the group's list of spans.
+    words: [u32; FOOTPRINT_WORDS],
 }
 
-/// A span as a number: its first tile in the low 16 bits, its end in the high 16 bits.
+/// The bits of a [`PackedSpan`] that hold its first tile. A row has at most 4096 tiles.
+pub(crate) const FIRST_TILE_BITS: u32 = 19;
+
+/// A span as a number: its first tile in the low [`FIRST_TILE_BITS`] bits, the number of its tiles in the others. If
+/// a number is added to it, the first tile moves on by as much, as long as it fits into its bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct PackedSpan(u32);
 
 impl From<TileSpan> for PackedSpan {
     #[inline(always)]
     fn from(span: TileSpan) -> Self {
-        Self(u32::from(span.first) | u32::from(span.end) << 16)
+        Self(u32::from(span.first) | (span.len() as u32) << FIRST_TILE_BITS)
     }
 }
 
 impl From<PackedSpan> for TileSpan {
     #[inline(always)]
-    fn from(PackedSpan(bits): PackedSpan) -> Self {
+    fn from(span: PackedSpan) -> Self {
+        let [first, end] = span.tiles();
         Self {
-            first: bits as u16,
-            end: (bits >> 16) as u16,
+            first: first as u16,
+            end: end as u16,
         }
     }
 }
@@ -63,6 +69,32 @@ impl PackedSpan {
     pub(super) fn from_bits(bits: u32) -> Self {
         Self(bits)
     }
+
+    /// The number of tiles.
+    #[inline(always)]
+    pub(super) fn len(self) -> u32 {
+        self.0 >> FIRST_TILE_BITS
+    }
+
+    /// True if it has no tiles.
+    #[inline(always)]
+    pub(super) fn is_empty(self) -> bool {
+        self.len() == 0
+    }
+
+    /// The span whose tiles have numbers that are greater by `tiles`. The sum must fit into [`FIRST_TILE_BITS`] bits,
+    /// unless the span has no tiles.
+    #[inline(always)]
+    pub(super) fn moved_by(self, tiles: u32) -> Self {
+        Self(self.0.wrapping_add(tiles))
+    }
+
+    /// The first tile, and one past the last.
+    #[inline(always)]
+    pub(super) fn tiles(self) -> [u32; 2] {
+        let first = self.0 & ((1 << FIRST_TILE_BITS) - 1);
+        [first, first + self.len()]
+    }
 }
 
 impl TileFootprint {
@@ -70,45 +102,38 @@ impl TileFootprint {
     /// extended by them.
     #[inline(always)]
     pub(crate) fn new(row: u16, rows: u16, others: &mut Vec<TileSpan>) -> Self {
-        let mut reach = Self {
-            rows: u32::from(row) | u32::from(rows) << 16,
-            held: [0; HELD_ROWS],
-        };
+        let mut words = [0; FOOTPRINT_WORDS];
+        words[0] = u32::from(row) | u32::from(rows) << 16;
         if usize::from(rows) > HELD_ROWS {
-            reach.held[0] = others.len() as u32;
+            words[1] = others.len() as u32;
             let len = others.len() + usize::from(rows);
             host::resize(others, len, TileSpan::default());
         }
-        reach
+        Self { words }
     }
 
-    /// The footprint as two 64-bit words, for storage.
+    /// The footprint as words, for storage: its rows, then its spans.
     #[inline(always)]
-    pub(super) fn words(&self) -> [u64; 2] {
-        let both = |low: u32, high: u32| u64::from(low) | u64::from(high) << 32;
-        let [first, second, third] = self.held;
-        [both(self.rows, first), both(second, third)]
+    pub(super) fn words(&self) -> [u32; FOOTPRINT_WORDS] {
+        self.words
     }
 
     /// The footprint that [`TileFootprint::words`] made these words of.
     #[inline(always)]
-    pub(super) fn from_words([first, second]: [u64; 2]) -> Self {
-        Self {
-            rows: first as u32,
-            held: [(first >> 32) as u32, second as u32, (second >> 32) as u32],
-        }
+    pub(super) fn from_words(words: [u32; FOOTPRINT_WORDS]) -> Self {
+        Self { words }
     }
 
     /// The first row.
     #[inline(always)]
     fn row(&self) -> u32 {
-        self.rows & 0xFFFF
+        self.words[0] & 0xFFFF
     }
 
     /// The number of rows.
     #[inline(always)]
     fn len(&self) -> usize {
-        (self.rows >> 16) as usize
+        (self.words[0] >> 16) as usize
     }
 
     /// Sets the span of its row `number`, counted from its first row.
@@ -116,9 +141,9 @@ impl TileFootprint {
     pub(crate) fn set(&mut self, others: &mut [TileSpan], number: u16, span: TileSpan) {
         let at = usize::from(number);
         if self.len() > HELD_ROWS {
-            others[self.held[0] as usize + at] = span;
+            others[self.words[1] as usize + at] = span;
         } else {
-            self.held[at % HELD_ROWS] = PackedSpan::from(span).0;
+            self.words[1 + at % HELD_ROWS] = PackedSpan::from(span).0;
         }
     }
 
@@ -135,9 +160,9 @@ impl TileFootprint {
     #[inline(always)]
     fn span(&self, others: &[TileSpan], number: usize) -> TileSpan {
         if self.len() > HELD_ROWS {
-            others[self.held[0] as usize + number]
+            others[self.words[1] as usize + number]
         } else {
-            PackedSpan(self.held[number]).into()
+            PackedSpan(self.words[1 + number]).into()
         }
     }
 
@@ -156,7 +181,8 @@ impl TileFootprint {
     /// `None` if the spans are in the group's list.
     #[inline(always)]
     pub(crate) fn held(&self) -> Option<(u32, [PackedSpan; HELD_ROWS])> {
-        (self.len() <= HELD_ROWS).then(|| (self.row(), self.held.map(PackedSpan)))
+        let [_, held @ ..] = self.words;
+        (self.len() <= HELD_ROWS).then(|| (self.row(), held.map(PackedSpan)))
     }
 }
 

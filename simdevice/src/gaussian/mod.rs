@@ -54,6 +54,7 @@ use footprint::Visible;
 use preprocess::Preprocessor;
 use rayon::prelude::*;
 use reuse::Key;
+use sort::SortBuffers;
 use sorted_set::SortedSet;
 use splat::ProjectedGroup;
 use std::sync::Arc;
@@ -87,7 +88,8 @@ pub fn sort_and_bin(
     }
     // All of it runs on the workers, because each change from this thread to them and back puts threads to sleep and
     // wakes them.
-    let (sorted, record) = runtime.install(|| sort(&set, &clusters, runtime, counters))?;
+    let (sorted, record) =
+        runtime.install(|| sort(&set, &clusters, runtime, &caches.sort_buffers, counters))?;
     let sorted = Arc::new(sorted);
     if let Some(key) = key {
         let bytes = sorted.memory_bytes();
@@ -113,18 +115,20 @@ fn sort(
     set: &GaussianSet,
     clusters: &[Option<Arc<Clusters>>],
     runtime: &Runtime,
+    buffers: &SortBuffers,
     counters: &mut Counters,
 ) -> Result<(SortedSet, Option<Arc<DrawRecord>>), SortError> {
     let started = Instant::now();
     let mut preprocessed = preprocess_set(set, clusters, runtime)?;
     let projected = Instant::now();
     let threads = runtime.threads();
-    let pairs = depth_order::sorted(&preprocessed.groups, threads);
+    let pairs = depth_order::sorted(&preprocessed.groups, threads, buffers);
     let sorted = Instant::now();
     // A pair takes twelve bytes while lists are built: four times the budget of all lists of a pass.
     let most_pairs = runtime.config().bin_budget_bytes / 3;
     let groups = &mut preprocessed.groups;
-    let tiles = TileLists::build(groups, &pairs, set.bounds, threads, most_pairs);
+    let tiles = TileLists::build(groups, pairs.pairs(), set.bounds, threads, most_pairs);
+    pairs.give_back(buffers);
     let binned = Instant::now();
     let fixed = preprocessed.fixed;
     let (by_device, by_programs) = (preprocessed.by_device, preprocessed.by_programs);

@@ -2,9 +2,10 @@
 //! keys.
 //!
 //! Everything from the camera-space mean to the conic is computed in binary64 and rounded once at the end: in binary32
-//! the determinant of a very thin Gaussian and the depth of neighbours are wrong in the fourth digit. Gaussians are
-//! culled before the covariance is computed, and spherical harmonics are read only for Gaussians that reach a tile. No
-//! fused operations are used, so that keys and means have the same bits at every SIMD level.
+//! the determinant of a very thin Gaussian and the depth of neighbours are wrong in the fourth digit. Tiles and
+//! directions are computed in binary32 where that is enough. Gaussians are culled before the covariance is computed, and
+//! spherical harmonics are read only for Gaussians that reach a tile. No fused operations are used for keys and means,
+//! so that these have the same bits at every SIMD level.
 
 use super::attributes::{Attributes, CoefficientReader, Fetcher, Group, Harmonics};
 use super::camera::{LN_2, ViewConstants};
@@ -16,7 +17,9 @@ use super::lanes::{Bits, F32_LANES, GROUP, GroupF64, log2};
 use super::ray_depth::RayDepth;
 use super::scratch::{Scratch, ScreenGaussians};
 use super::sort::ordered_bits;
-use super::spherical_harmonics::{Bases, COEFFICIENT_FLOATS, DIRECTIONS, coefficient_count};
+use super::spherical_harmonics::{
+    Bases, COEFFICIENT_FLOATS, DIRECTIONS, MAX_COEFFICIENTS, coefficient_count,
+};
 use super::splat::{ProjectedGroup, Splat, are_steep, binary16_headroom};
 use super::surfel::surfel_of;
 use super::tiles::find_tiles;
@@ -29,7 +32,7 @@ use crate::state::gaussian::{CameraModel, GaussianGeometry, GaussianOrder, Gauss
 use crate::stats::counters::{Counter, Counters};
 use crate::stats::optimizations::Optimization;
 use devmem::{dispatch, host};
-use fearless_simd::{Simd, prelude::*};
+use fearless_simd::{Simd, f32x16, prelude::*};
 use rayon::prelude::*;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -53,6 +56,21 @@ pub(super) struct Source<'a> {
 }
 
 impl Source<'_> {
+    /// Reads the spherical harmonics of a lane into `read`, and zeros where the draw has fewer, and returns `read`.
+    #[inline(never)]
+    fn read_harmonics<'b>(
+        &self,
+        lane: usize,
+        read: &'b mut [f32; COEFFICIENT_FLOATS],
+    ) -> &'b [f32] {
+        let floats = self.reader.floats();
+        match self.harmonics.from(lane).get(..floats) {
+            Some(last) if floats > 0 => read[..floats].copy_from_slice(last),
+            _ => self.reader.read(&self.group, lane, read),
+        }
+        read
+    }
+
     /// Starts to load the spherical harmonics of degrees 0 to `degree` into the processor's cache, for the lanes that
     /// have a bit in `kept`.
     #[inline(always)]
@@ -76,14 +94,23 @@ impl Source<'_> {
     }
 }
 
-/// Projects a group and appends the result to `out`. `sequence` maps a lane to its Gaussian's number in the set.
+/// The numbers in the set of a group's Gaussians.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Sequence<'a> {
+    /// Consecutive numbers, from this one on.
+    From(u32),
+    /// These numbers, counted from the first one.
+    Listed(u32, &'a [u32]),
+}
+
+/// Projects a group and appends the result to `out`.
 #[inline(always)]
 pub(super) fn project<S: Simd>(
     view: &ViewConstants,
     simd: S,
     source: &Source<'_>,
     scratch: &mut Scratch,
-    sequence: impl Fn(usize) -> u32,
+    sequence: Sequence<'_>,
     out: &mut ProjectedGroup,
 ) {
     let counters = &mut out.counters;
@@ -223,16 +250,6 @@ fn flatten<S: Simd>(view: &ViewConstants, simd: S, source: &Source<'_>, scratch:
         unscented::transform(view, by_matrices, scratch);
     }
     let moments = &*scratch.moments;
-    let toward = match &scratch.placed {
-        Some(placed) if by_matrices => &placed.toward,
-        _ => &*scratch.offset,
-    };
-    #[cfg(feature = "mistakes")]
-    let toward = if Mistake::DirectionsOfWorld.is_made() {
-        &*scratch.offset
-    } else {
-        toward
-    };
     let number = |value: f64| S::f64s::splat(simd, value);
     let load =
         |lanes: &GroupF64, at: usize| S::f64s::from_slice(simd, &lanes[at..at + S::f64s::LEN]);
@@ -252,7 +269,7 @@ fn flatten<S: Simd>(view: &ViewConstants, simd: S, source: &Source<'_>, scratch:
         let [w, x] = [load(&rotation[0], at), load(&rotation[1], at)];
         let [y, z] = [load(&rotation[2], at), load(&rotation[3], at)];
         // Squares of binary32 numbers are in binary64's range.
-        let double = two / (w * w + x * x + y * y + z * z);
+        let double = two / z.mul_add(z, y.mul_add(y, x.mul_add(x, w * w)));
         let [dx, dy, dz] = [double * x, double * y, double * z];
         let (xx, yy, zz) = (dx * x, dy * y, dz * z);
         let (xy, xz, yz) = (dx * y, dx * z, dy * z);
@@ -287,16 +304,16 @@ fn flatten<S: Simd>(view: &ViewConstants, simd: S, source: &Source<'_>, scratch:
             };
             for part in 0..3 {
                 let [cx, cy, cz] = columns[part];
-                m[axis][part] = scale[part] * (kx * cx + ky * cy + kz * cz);
+                m[axis][part] = scale[part] * kz.mul_add(cz, ky.mul_add(cy, kx * cx));
             }
         }
         let [[ax, ay, az], [bx, by, bz]] = m;
         let [cx, cy, cz] = [ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx];
-        let mut area2 = cx * cx + cy * cy + cz * cz;
+        let mut area2 = cz.mul_add(cz, cy.mul_add(cy, cx * cx));
         let mut covariance = [
-            ax * ax + ay * ay + az * az,
-            ax * bx + ay * by + az * bz,
-            bx * bx + by * by + bz * bz,
+            az.mul_add(az, ay.mul_add(ay, ax * ax)),
+            az.mul_add(bz, ay.mul_add(by, ax * bx)),
+            bz.mul_add(bz, by.mul_add(by, bx * bx)),
         ];
         if unscented {
             covariance = [
@@ -307,15 +324,6 @@ fn flatten<S: Simd>(view: &ViewConstants, simd: S, source: &Source<'_>, scratch:
             area2 = load(&moments[3], at);
         }
         shape(view, simd, at, covariance, area2, load(opacity, at), flat);
-
-        let [dx, dy, dz] = toward;
-        let [dx, dy, dz] = [load(dx, at), load(dy, at), load(dz, at)];
-        let unit = one / dx.abs().max(dy.abs()).max(dz.abs());
-        let [dx, dy, dz] = [dx * unit, dy * unit, dz * unit];
-        let per_norm = one / (dx * dx + dy * dy + dz * dz).sqrt();
-        for (lanes, d) in flat.direction.iter_mut().zip([dx, dy, dz]) {
-            store(d * per_norm, lanes);
-        }
     }
 }
 
@@ -348,7 +356,7 @@ pub(super) fn shape<S: Simd>(
         value.store_slice(&mut lanes[at..at + S::f64s::LEN]);
     };
     let low_pass = number(view.low_pass);
-    let determinant = area2 + low_pass * (xx + yy) + low_pass * low_pass;
+    let determinant = low_pass.mul_add(xx + yy, area2) + low_pass * low_pass;
     store(determinant, &mut flat.determinant);
     if view.compensated {
         let mut ratio = area2 / determinant;
@@ -364,7 +372,7 @@ pub(super) fn shape<S: Simd>(
     // alpha = opacity exp(-q / 2) = 2^(log2 opacity - q / (2 ln 2)), and
     // q = d.x^2 / a + (a / det) (d.y - (b / a) d.x)^2.
     let unit = (0.5 / LN_2).sqrt();
-    let (per_a, per_c) = (number(1.0) / a, number(1.0) / c);
+    let per_a = number(1.0) / a;
     let vertical = (a / determinant).sqrt() * unit;
     let factor = [per_a.sqrt() * unit, -(b * per_a) * vertical, vertical];
     store(factor[0], &mut flat.factor[0]);
@@ -382,20 +390,18 @@ pub(super) fn shape<S: Simd>(
         for lane in at..at + S::f64s::LEN {
             let factor = [0, 1, 2].map(|element| flat.factor[element][lane]);
             let room = flat.log2_opacity[lane] - view.log2_floor;
-            flat.half[0][lane] = binary16_headroom(factor, room) * (2.0 * LN_2);
+            flat.extent[lane] = binary16_headroom(factor, room) * (2.0 * LN_2);
         }
-        extent = S::f64s::from_slice(simd, &flat.half[0][at..at + S::f64s::LEN]);
+        extent = S::f64s::from_slice(simd, &flat.extent[at..at + S::f64s::LEN]);
     }
     #[cfg(feature = "mistakes")]
     if Mistake::ThreeSigmaBox.is_made() {
         extent = extent.min(number(9.0));
     }
-    let half_x = (a * extent).sqrt();
-    store(half_x, &mut flat.half[0]);
-    store((c * extent).sqrt(), &mut flat.half[1]);
-    store(b * per_c, &mut flat.slope);
-    store(determinant * per_c * per_c, &mut flat.narrowing);
-    store(b * per_a * half_x, &mut flat.peak);
+    store(extent, &mut flat.extent);
+    for (element, lanes) in [a, b, c].into_iter().zip(&mut flat.covariance) {
+        store(element, lanes);
+    }
 }
 
 /// Computes the positions of the kept Gaussians in camera space, and the viewing directions in their own space.
@@ -456,10 +462,19 @@ fn center_depth(view: &ViewConstants, at: usize, scratch: &Scratch) -> u32 {
 
 /// Computes the sort key and the sequence number of each kept lane.
 #[inline(always)]
-fn find_keys(view: &ViewConstants, sequence: impl Fn(usize) -> u32, scratch: &mut Scratch) {
+fn find_keys(view: &ViewConstants, sequence: Sequence<'_>, scratch: &mut Scratch) {
     let [keys, sequences] = &mut *scratch.keys;
-    for (to, &lane) in sequences.iter_mut().zip(&scratch.lanes) {
-        *to = sequence(lane);
+    let to_lanes = sequences.iter_mut().zip(&scratch.lanes);
+    match sequence {
+        Sequence::From(first) => to_lanes.for_each(|(to, &lane)| *to = first + lane as u32),
+        // All lanes are there, in order.
+        Sequence::Listed(first, numbers) if numbers.len() == scratch.lanes.len() => {
+            let to_lanes = sequences.iter_mut().zip(numbers);
+            to_lanes.for_each(|(to, &number)| *to = first + number);
+        }
+        Sequence::Listed(first, numbers) => {
+            to_lanes.for_each(|(to, &lane)| *to = first + numbers[lane]);
+        }
     }
     match view.order {
         GaussianOrder::ViewDepth => {
@@ -495,6 +510,60 @@ fn ray_depth(view: &ViewConstants, at: usize, scratch: &Scratch) -> RayDepth {
     )
 }
 
+/// The vectors from the eye to the means of the kept Gaussians, in the axes of the Gaussians' own space.
+fn toward<'a>(source: &Source<'_>, scratch: &'a Scratch) -> &'a [GroupF64; 3] {
+    #[cfg(feature = "mistakes")]
+    if Mistake::DirectionsOfWorld.is_made() {
+        return &scratch.offset;
+    }
+    match &scratch.placed {
+        Some(placed) if source.matrices.is_some() => &placed.toward,
+        _ => &scratch.offset,
+    }
+}
+
+/// The least and the greatest square of a length that is formed in binary32. Numbers of such lengths neither overflow
+/// nor lose digits to underflow.
+const SQUARES: [f32; 2] = [1e-20, 1e20];
+
+/// Gives vectors the length 1, in binary32. Changes nothing and returns false if the square of a length is outside of
+/// [`SQUARES`].
+#[inline(always)]
+fn normalize<S: Simd>(simd: S, vectors: &mut [[f32; DIRECTIONS]; 3]) -> bool {
+    let [x, y, z] = vectors
+        .each_ref()
+        .map(|lanes| f32x16::from_slice(simd, lanes));
+    let square = z.mul_add(z, y.mul_add(y, x * x));
+    let [least, greatest] = SQUARES;
+    if !square.max(least).min(greatest).simd_eq(square).all_true() {
+        return false;
+    }
+    let per_length = f32x16::splat(simd, 1.0) / square.sqrt();
+    for (lanes, part) in vectors.iter_mut().zip([x, y, z]) {
+        (part * per_length).store_slice(lanes);
+    }
+    true
+}
+
+/// Computes the directions of a batch of elements from the vectors `toward` them, whatever their lengths.
+#[cold]
+fn normalize_wide(
+    toward: &[GroupF64; 3],
+    batch: &[usize],
+    directions: &mut [[f32; DIRECTIONS]; 3],
+) {
+    for (number, &at) in batch.iter().enumerate() {
+        let vector = toward.each_ref().map(|lanes| lanes[at % GROUP]);
+        let [x, y, z] = vector.map(f64::abs);
+        let unit = 1.0 / x.max(y).max(z);
+        let [x, y, z] = vector.map(|part| part * unit);
+        let per_length = 1.0 / (x * x + y * y + z * z).sqrt();
+        for (lanes, part) in directions.iter_mut().zip([x, y, z]) {
+            lanes[number % DIRECTIONS] = (part * per_length) as f32;
+        }
+    }
+}
+
 /// Finds the tiles and colours of the kept Gaussians and appends those that reach a tile to `out`.
 #[inline(always)]
 pub(super) fn emit<S: Simd>(
@@ -502,13 +571,12 @@ pub(super) fn emit<S: Simd>(
     simd: S,
     source: &Source<'_>,
     scratch: &mut Scratch,
-    sequence: impl Fn(usize) -> u32,
+    sequence: Sequence<'_>,
     out: &mut ProjectedGroup,
 ) {
     out.reserve(scratch.lanes.len());
     find_tiles(view, simd, scratch, out);
     find_keys(view, sequence, scratch);
-    let reader = &source.reader;
     let degree = view.sh_degree;
     #[cfg(feature = "mistakes")]
     let degree = if Mistake::NoDegree4.is_made() {
@@ -516,42 +584,38 @@ pub(super) fn emit<S: Simd>(
     } else {
         degree
     };
-    let floats = reader.floats();
+    let toward = toward(source, scratch);
+    // Elements without a Gaussian have a direction too, so that they do not look like one without.
+    let (mut directions, mut bases) = ([[1.0; DIRECTIONS]; 3], Bases::default());
     let mut read = [0.0; COEFFICIENT_FLOATS];
-    let (mut directions, mut bases) = ([[0.0; DIRECTIONS]; 3], Bases::default());
     let mut copies = &*scratch.copies;
     for group in scratch.reached.chunks(DIRECTIONS) {
-        for (parts, lanes) in directions.iter_mut().zip(&scratch.flat.direction) {
+        for (parts, lanes) in directions.iter_mut().zip(toward) {
             for (part, &at) in parts.iter_mut().zip(group) {
                 *part = lanes[at % GROUP] as f32;
-                #[cfg(feature = "mistakes")]
-                if Mistake::HarmonicsReversed.is_made() {
-                    *part = -*part;
-                }
             }
+        }
+        if !normalize(simd, &mut directions) {
+            normalize_wide(toward, group, &mut directions);
+        }
+        #[cfg(feature = "mistakes")]
+        if Mistake::HarmonicsReversed.is_made() {
+            let parts = directions.as_flattened_mut().iter_mut();
+            parts.for_each(|part| *part = -*part);
         }
         bases.find(simd, degree, &directions);
-        let needed = 3 * coefficient_count(degree) + 1;
-        let is_whole = floats + 1 >= needed;
         // All colours are computed first, so that their reads from memory overlap.
-        let mut colored = Colored::default();
-        for (number, &at) in group.iter().enumerate() {
-            let lane = scratch.lanes[at % GROUP];
-            let rest = source.harmonics.from(lane);
-            let coefficients = if is_whole && rest.len() >= needed {
-                rest
-            } else {
-                match rest.get(..floats) {
-                    Some(last) if floats > 0 => read[..floats].copy_from_slice(last),
-                    _ => reader.read(&source.group, lane, &mut read),
-                }
-                &read
-            };
-            match bases.color(simd, degree, number, coefficients) {
-                Some(color) => colored.push(at, color),
-                None => out.counters.add(Counter::SkippedNonFinite, 1),
-            }
-        }
+        let lanes = &*scratch.lanes;
+        let colored = match degree {
+            0 => color::<S, 1>(simd, source, lanes, group, &bases, &mut read),
+            1 => color::<S, 4>(simd, source, lanes, group, &bases, &mut read),
+            2 => color::<S, 9>(simd, source, lanes, group, &bases, &mut read),
+            3 => color::<S, 16>(simd, source, lanes, group, &bases, &mut read),
+            _ => color::<S, MAX_COEFFICIENTS>(simd, source, lanes, group, &bases, &mut read),
+        };
+        let uncolored = group.len() - colored.all().len();
+        out.counters
+            .add(Counter::SkippedNonFinite, uncolored as u64);
         let Some(period) = view.period else {
             append(view, colored.all(), scratch, out);
             continue;
@@ -590,7 +654,7 @@ fn append(
         Some(period) => out
             .splats
             .extend(lanes.iter().zip(splats).map(|(one, splat)| {
-                let wide = 2.0 * scratch.flat.half[0][one.at] >= period;
+                let wide = 2.0 * scratch.flat.ellipse(one.at).half[0] >= period;
                 Splat {
                     needs_f64: wide || splat.needs_f64,
                     exceeds_period: wide,
@@ -638,7 +702,6 @@ impl ColoredLane {
 }
 
 /// The coloured lanes of a batch of directions.
-#[derive(Default)]
 struct Colored {
     lanes: [ColoredLane; DIRECTIONS],
     len: usize,
@@ -646,17 +709,48 @@ struct Colored {
 
 impl Colored {
     #[inline(always)]
-    fn push(&mut self, at: usize, color: [f32; 4]) {
-        self.lanes[self.len % DIRECTIONS] = ColoredLane {
-            at: at % GROUP,
-            color,
-        };
-        self.len += 1;
-    }
-
-    #[inline(always)]
     fn all(&self) -> &[ColoredLane] {
         &self.lanes[..self.len.min(DIRECTIONS)]
+    }
+}
+
+/// Computes the colours of a batch of elements from `COUNT` coefficients each, in the directions of `bases`. Elements
+/// whose coefficients are not finite are left out. `lanes` are the elements' lanes, and `read` is scratch, of zeros where
+/// the draw has no coefficients.
+#[inline(always)]
+fn color<S: Simd, const COUNT: usize>(
+    simd: S,
+    source: &Source<'_>,
+    lanes: &[usize],
+    batch: &[usize],
+    bases: &Bases,
+    read: &mut [f32; COEFFICIENT_FLOATS],
+) -> Colored {
+    let mut colored = [ColoredLane::default(); DIRECTIONS];
+    let mut len = 0;
+    // One more than there are, since vectors have four numbers and coefficients three.
+    let needed = 3 * COUNT + 1;
+    let held = if source.reader.floats() + 1 >= needed {
+        source.harmonics
+    } else {
+        Harmonics::default()
+    };
+    for (number, &at) in batch.iter().enumerate() {
+        let lane = lanes[at % GROUP];
+        let coefficients = match held.first(lane, needed) {
+            Some(coefficients) => coefficients,
+            None => source.read_harmonics(lane, read),
+        };
+        if let Some(color) = bases.color_of::<S, COUNT>(simd, number, coefficients) {
+            let to = &mut colored[len % DIRECTIONS];
+            to.at = at % GROUP;
+            color.store_slice(&mut to.color);
+            len += 1;
+        }
+    }
+    Colored {
+        lanes: colored,
+        len,
     }
 }
 
@@ -834,9 +928,9 @@ impl Preprocessor<'_> {
             frustum: bounds,
             ..source
         };
-        let sequence = |lane: usize| match &task.part {
-            GroupSource::From(start) => task.sequence + start + lane as u32,
-            GroupSource::Cluster(cluster) => task.sequence + cluster.numbers[lane],
+        let sequence = match task.part {
+            GroupSource::From(start) => Sequence::From(task.sequence + start),
+            GroupSource::Cluster(cluster) => Sequence::Listed(task.sequence, &cluster.numbers),
         };
         dispatch!(self.runtime.level(), simd => project(constants, simd, &source, scratch, sequence, &mut out));
         out

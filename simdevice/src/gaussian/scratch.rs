@@ -1,19 +1,19 @@
 //! The buffers that a worker needs to project a group of Gaussians.
 
 use super::attributes::Attributes;
-use super::footprint::TileFootprint;
+use super::footprint::{Ellipse, FOOTPRINT_WORDS, TileFootprint};
 use super::instances::{Matrices, Placed};
 use super::lanes::{Bits, F32_LANES, GROUP, GroupF64, NO_GROUP_F64};
 
 /// The greatest share of culled lanes at which all lanes are processed is `1 / MOST`.
 const MOST: usize = 4;
 
-/// The tile footprint of each lane, as the two words of [`TileFootprint::words`].
-pub(super) struct TileFootprints(pub(super) [[u64; GROUP + 8]; 2]);
+/// The tile footprint of each lane, as the words of [`TileFootprint::words`].
+pub(super) struct TileFootprints(pub(super) [[u32; FOOTPRINT_WORDS]; GROUP + 8]);
 
 impl Default for TileFootprints {
     fn default() -> Self {
-        Self([[0; GROUP + 8]; 2])
+        Self([[0; FOOTPRINT_WORDS]; GROUP + 8])
     }
 }
 
@@ -21,13 +21,11 @@ impl TileFootprints {
     /// The footprint of a lane.
     #[inline(always)]
     pub(super) fn get(&self, at: usize) -> TileFootprint {
-        TileFootprint::from_words([self.0[0][at], self.0[1][at]])
+        TileFootprint::from_words(self.0[at])
     }
 
     pub(super) fn set(&mut self, at: usize, reach: &TileFootprint) {
-        let [first, second] = reach.words();
-        self.0[0][at] = first;
-        self.0[1][at] = second;
+        self.0[at] = reach.words();
     }
 }
 
@@ -73,13 +71,11 @@ pub(super) struct ScreenGaussians {
     pub(super) steep: Bits,
     /// The factors of the exponent: see [`Splat::factor`](super::splat::Splat::factor).
     pub(super) factor: [GroupF64; 3],
-    /// The half size of the ellipse's box: see [`Ellipse`](super::footprint::Ellipse).
-    pub(super) half: [GroupF64; 2],
-    pub(super) slope: GroupF64,
-    pub(super) narrowing: GroupF64,
-    pub(super) peak: GroupF64,
-    /// The unit vector from the eye, in the axes of the Gaussians' space.
-    pub(super) direction: [GroupF64; 3],
+    /// The covariance in the picture: xx, xy and yy in px^2.
+    pub(super) covariance: [GroupF64; 3],
+    /// The greatest `d^T S^-1 d` at which the alpha floor may be reached, S being the covariance. Negative where it is
+    /// reached nowhere.
+    pub(super) extent: GroupF64,
 }
 
 impl Default for ScreenGaussians {
@@ -90,11 +86,25 @@ impl Default for ScreenGaussians {
             log2_opacity: NO_GROUP_F64,
             steep: Bits::default(),
             factor: [NO_GROUP_F64; 3],
-            half: [NO_GROUP_F64; 2],
-            slope: NO_GROUP_F64,
-            narrowing: NO_GROUP_F64,
-            peak: NO_GROUP_F64,
-            direction: [NO_GROUP_F64; 3],
+            covariance: [NO_GROUP_F64; 3],
+            extent: NO_GROUP_F64,
+        }
+    }
+}
+
+impl ScreenGaussians {
+    /// The ellipse outside of which element `at` does not reach the alpha floor. Its sizes are NaN where it reaches
+    /// the floor nowhere.
+    pub(super) fn ellipse(&self, at: usize) -> Ellipse {
+        let [a, b, c] = self.covariance.each_ref().map(|lanes| lanes[at]);
+        let extent = self.extent[at];
+        let half_x = (a * extent).sqrt();
+        Ellipse {
+            mean: self.mean.each_ref().map(|lanes| lanes[at]),
+            half: [half_x, (c * extent).sqrt()],
+            slope: b / c,
+            narrowing: self.determinant[at] / c / c,
+            peak: b / a * half_x,
         }
     }
 }

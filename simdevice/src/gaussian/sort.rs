@@ -3,6 +3,7 @@
 
 use devmem::host;
 use rayon::prelude::*;
+use std::sync::{Mutex, PoisonError};
 
 /// A key and its payload.
 type SortEntry = (u32, u32);
@@ -119,32 +120,100 @@ fn sort_into(slices: &[&[SortEntry]], other: &mut Vec<SortEntry>, sorted: &mut [
     }
 }
 
+/// The most pairs of all buffers that are kept together.
+const MOST_KEPT: usize = 1 << 23;
+
+/// Memory of earlier sorts, which later ones use again: zeros need not be written to it first.
+#[derive(Debug, Default)]
+pub struct SortBuffers(Mutex<Vec<Vec<SortEntry>>>);
+
+impl SortBuffers {
+    /// A buffer of at least `count` pairs of any values.
+    fn take(&self, count: usize) -> Vec<SortEntry> {
+        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let places = 0..kept.len();
+        let fits = |&place: &usize| kept[place].len() >= count;
+        let place = places
+            .clone()
+            .filter(fits)
+            .min_by_key(|&place| kept[place].len());
+        if let Some(place) = place {
+            return kept.swap_remove(place);
+        }
+        // The smallest one goes, so that they do not become more and more.
+        if let Some(place) = places.min_by_key(|&place| kept[place].len()) {
+            kept.swap_remove(place);
+        }
+        drop(kept);
+        // A little more, since the next sort may be of a few more.
+        host::zeroed(count + count / 8)
+    }
+
+    /// Keeps a buffer for later sorts, unless it is so small that it saves nothing.
+    fn keep(&self, buffer: Vec<SortEntry>) {
+        if buffer.len() < MANY / GROUPS_PER_WORKER {
+            return;
+        }
+        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let all: usize = kept.iter().map(Vec::len).sum();
+        if all + buffer.len() <= MOST_KEPT {
+            host::push(&mut kept, buffer);
+        }
+    }
+}
+
+/// Pairs at the beginning of a buffer.
+#[derive(Debug)]
+pub struct SortedPairs {
+    buffer: Vec<SortEntry>,
+    len: usize,
+}
+
+impl SortedPairs {
+    /// The pairs.
+    pub fn pairs(&self) -> &[SortEntry] {
+        &self.buffer[..self.len]
+    }
+
+    /// Gives the memory back to the buffers that it comes from.
+    pub(super) fn give_back(self, buffers: &SortBuffers) {
+        // That of few pairs does not come from there.
+        if self.len >= MANY {
+            buffers.keep(self.buffer);
+        }
+    }
+}
+
 /// Sorts the items of all lists. An item's first number is its key; its payload becomes its place in its list plus
 /// `stride` times the list's number. Then calls `settle` with each piece of the result; no two pieces share a key.
-/// `workers` share the work.
+/// `workers` share the work. The memory comes from `buffers`.
 pub fn sort_lists<L: AsRef<[[u32; 2]]> + Sync>(
     lists: &[L],
     stride: u32,
     workers: usize,
+    buffers: &SortBuffers,
     settle: impl Fn(&mut [SortEntry]) + Sync,
-) -> Vec<SortEntry> {
+) -> SortedPairs {
     let count = lists.iter().map(|list| list.as_ref().len()).sum();
     if count < MANY {
         let mut pairs = host::with_capacity(count);
         for_pairs(lists, 0, stride, |pair| pairs.push(pair));
         sort_by_key(&mut pairs);
         settle(&mut pairs);
-        return pairs;
+        return SortedPairs {
+            buffer: pairs,
+            len: count,
+        };
     }
     let parts = Parts::new(lists, count);
     let in_group = lists.len().div_ceil(GROUPS_PER_WORKER * workers.max(1));
     let groups: Vec<Partition> = lists
         .par_chunks(in_group)
         .enumerate()
-        .map(|(number, lists)| Partition::new(&parts, lists, number * in_group, stride))
+        .map(|(number, lists)| Partition::new(&parts, lists, number * in_group, stride, buffers))
         .collect();
-    let mut pairs: Vec<SortEntry> = host::zeroed(count);
-    let mut rest = &mut pairs[..];
+    let mut pairs = buffers.take(count);
+    let mut rest = &mut pairs[..count];
     let mut tasks = Vec::with_capacity(parts.count);
     for part in 0..parts.count {
         let slices: Vec<&[SortEntry]> = groups.iter().map(|group| group.part(part)).collect();
@@ -159,7 +228,13 @@ pub fn sort_lists<L: AsRef<[[u32; 2]]> + Sync>(
             sort_into(&slices, other, sorted);
             settle(sorted);
         });
-    pairs
+    for group in groups {
+        buffers.keep(group.pairs);
+    }
+    SortedPairs {
+        buffer: pairs,
+        len: count,
+    }
 }
 
 /// Calls `each` with all keys and payloads, in order. The first list has number `first`.
@@ -233,6 +308,7 @@ impl Parts {
 
 /// The pairs of some lists, grouped by part. Within a part they are in the lists' order.
 struct Partition {
+    /// The pairs, and others after them.
     pairs: Vec<SortEntry>,
     /// The index one past the last pair of each part.
     ends: Box<[u32; MAX_PARTS]>,
@@ -240,14 +316,20 @@ struct Partition {
 
 impl Partition {
     /// The partition of lists of which the first has number `first`.
-    fn new<L: AsRef<[[u32; 2]]>>(parts: &Parts, lists: &[L], first: usize, stride: u32) -> Self {
+    fn new<L: AsRef<[[u32; 2]]>>(
+        parts: &Parts,
+        lists: &[L],
+        first: usize,
+        stride: u32,
+        buffers: &SortBuffers,
+    ) -> Self {
         let mut ends = Box::new([0; MAX_PARTS]);
         for item in lists.iter().flat_map(|list| list.as_ref()) {
             ends[parts.of(item[0]) % MAX_PARTS] += 1;
         }
         start_after_each_other(&mut *ends);
         let count = lists.iter().map(|list| list.as_ref().len()).sum();
-        let mut pairs: Vec<SortEntry> = host::zeroed(count);
+        let mut pairs = buffers.take(count);
         for_pairs(lists, first, stride, |pair| {
             let end = &mut ends[parts.of(pair.0) % MAX_PARTS];
             pairs[*end as usize] = pair;
@@ -339,16 +421,23 @@ mod tests {
                     .collect();
                 lists.push(list);
             }
-            let mut expected = Vec::new();
-            for_pairs(&lists, 0, 4096, |pair| expected.push(pair));
-            expected.sort_by_key(|pair| pair.0);
-            let seen = std::sync::atomic::AtomicUsize::new(0);
-            let found = sort_lists(&lists, 4096, workers, |part| {
-                assert!(part.is_sorted_by_key(|pair| pair.0));
-                seen.fetch_add(part.len(), std::sync::atomic::Ordering::Relaxed);
-            });
-            prop_assert_eq!(found, expected);
-            prop_assert_eq!(seen.into_inner(), lists.iter().map(Vec::len).sum::<usize>());
+            let buffers = SortBuffers::default();
+            // Fewer at first, so that buffers are too small, then enough, and then more than enough.
+            for of in [1, lists.len(), lists.len(), 1] {
+                let lists = &lists[..of];
+                let count = lists.iter().map(Vec::len).sum::<usize>();
+                let mut expected = Vec::new();
+                for_pairs(lists, 0, 4096, |pair| expected.push(pair));
+                expected.sort_by_key(|pair| pair.0);
+                let seen = std::sync::atomic::AtomicUsize::new(0);
+                let found = sort_lists(lists, 4096, workers, &buffers, |part| {
+                    assert!(part.is_sorted_by_key(|pair| pair.0));
+                    seen.fetch_add(part.len(), std::sync::atomic::Ordering::Relaxed);
+                });
+                prop_assert_eq!(found.pairs(), expected);
+                prop_assert_eq!(seen.into_inner(), count);
+                found.give_back(&buffers);
+            }
         }
 
         #[test]

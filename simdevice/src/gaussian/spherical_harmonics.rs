@@ -118,26 +118,38 @@ impl Bases {
         direction: usize,
         coefficients: &[f32],
     ) -> Option<[f32; 4]> {
-        let at = direction % DIRECTIONS;
-        let sum = match degree {
-            0 => self.sum::<S, 1>(simd, at, coefficients),
-            1 => self.sum::<S, 4>(simd, at, coefficients),
-            2 => self.sum::<S, 9>(simd, at, coefficients),
-            3 => self.sum::<S, 16>(simd, at, coefficients),
-            _ => self.sum::<S, MAX_COEFFICIENTS>(simd, at, coefficients),
+        let color = match degree {
+            0 => self.color_of::<S, 1>(simd, direction, coefficients),
+            1 => self.color_of::<S, 4>(simd, direction, coefficients),
+            2 => self.color_of::<S, 9>(simd, direction, coefficients),
+            3 => self.color_of::<S, 16>(simd, direction, coefficients),
+            _ => self.color_of::<S, MAX_COEFFICIENTS>(simd, direction, coefficients),
         };
+        color.map(|color| color.to_array())
+    }
+
+    /// The colour that [`Bases::color`] returns, for `COUNT` coefficients.
+    #[inline(always)]
+    pub(super) fn color_of<S: Simd, const COUNT: usize>(
+        &self,
+        simd: S,
+        direction: usize,
+        coefficients: &[f32],
+    ) -> Option<f32x4<S>> {
+        let at = direction % DIRECTIONS;
+        let sum = self.sum::<S, COUNT>(simd, at, coefficients);
         // Coefficients that are not finite make the sum so, whatever they are multiplied by. The sum may also overflow.
         // The fourth lane is ignored.
         if (sum * 0.0).simd_eq(0.0).to_bitmask() & 7 != 7 {
-            return self.wide_color(degree, at, coefficients);
+            let color = self.wide_color(COUNT, at, coefficients)?;
+            return Some(f32x4::from_slice(simd, &color));
         }
-        Some(sum.max(0.0).to_array())
+        Some(sum.max(0.0))
     }
 
     /// The colour where the binary32 sum is not finite. The sum is in binary64, which cannot overflow here.
     #[cold]
-    fn wide_color(&self, degree: u32, direction: usize, coefficients: &[f32]) -> Option<[f32; 4]> {
-        let count = coefficient_count(degree).min(MAX_COEFFICIENTS);
+    fn wide_color(&self, count: usize, direction: usize, coefficients: &[f32]) -> Option<[f32; 4]> {
         if !coefficients[..3 * count].iter().all(|k| k.is_finite()) {
             return None;
         }

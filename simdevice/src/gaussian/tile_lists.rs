@@ -9,7 +9,7 @@
 //! If the lists would exceed their budget, as those of a million Gaussians that fill a large screen do, none are made:
 //! each tile then searches the sorted sequence itself, a piece at a time, until it is saturated.
 
-use super::footprint::{HELD_ROWS, PackedSpan, TileFootprint, TileSpan};
+use super::footprint::{FIRST_TILE_BITS, HELD_ROWS, PackedSpan, TileFootprint, TileSpan};
 use super::splat::{ProjectedGroup, locate};
 use crate::limits::TILE_SIZE;
 use crate::state::Rect;
@@ -129,21 +129,20 @@ struct Rows {
 /// Consecutive tiles of a row, and a primitive that reaches them.
 #[derive(Clone, Copy, Debug, Default)]
 struct TileRun {
-    /// The number in the band of its first tile.
-    first: u32,
-    /// The number after that of its last tile.
-    end: u32,
+    /// Tiles by their number in the band.
+    tiles: PackedSpan,
     primitive: u32,
 }
+
+/// The most tiles of a band: their numbers fit into a [`PackedSpan`].
+const MOST_BAND_TILES: u32 = 1 << FIRST_TILE_BITS;
 
 impl TileRun {
     /// The run of a span in the row whose first tile has number `row_start` in the band.
     #[inline(always)]
     fn new(row_start: u32, span: PackedSpan, primitive: u32) -> Self {
-        let TileSpan { first, end } = span.into();
         Self {
-            first: row_start.wrapping_add(first.into()),
-            end: row_start.wrapping_add(end.into()),
+            tiles: span.moved_by(row_start),
             primitive,
         }
     }
@@ -151,14 +150,19 @@ impl TileRun {
     /// The number in the band of its first tile, and that after its last.
     #[inline(always)]
     fn tiles(self) -> [usize; 2] {
-        [self.first as usize, self.end as usize]
+        self.tiles.tiles().map(|tile| tile as usize)
     }
 }
 
-/// The runs of a band in the order of primitives. Elements from `len` on are unused.
+/// The most runs that wait before they are appended to the others of their band.
+const WAITING: usize = 256;
+
+/// The runs of a band in the order of primitives.
 #[derive(Debug)]
 struct TileRuns {
     runs: Vec<TileRun>,
+    /// The last runs. Elements from `len` on are unused.
+    waiting: Box<[TileRun; WAITING]>,
     len: usize,
 }
 
@@ -197,7 +201,8 @@ impl TileLists {
         let rows = tile(i64::from(bounds.y) + i64::from(bounds.height) - 1) - first_row + 1;
         let columns = tile(i64::from(bounds.x) + i64::from(bounds.width) - 1) + 1;
         let threads = threads.max(1);
-        let band_rows = rows.div_ceil(threads as u32);
+        let most_rows = (MOST_BAND_TILES / columns).max(1);
+        let band_rows = rows.div_ceil(threads as u32).min(most_rows);
         let bands = rows.div_ceil(band_rows) as usize;
         let places = |row: u32| (row / band_rows, row % band_rows * columns);
         let grid = Rows {
@@ -217,7 +222,7 @@ impl TileLists {
             .map(|run| grid.expand(&seen, run, bands, allow))
             .collect();
         let bands = runs.and_then(|runs| {
-            let of_band = |band: usize| host::collect(runs.iter().map(|run| run[band].written()));
+            let of_band = |band: usize| host::collect(runs.iter().map(|run| run[band].settled()));
             let tiles = (band_rows * columns) as usize;
             let counted: Vec<TileCounts> = (0..bands)
                 .into_par_iter()
@@ -312,9 +317,6 @@ impl Rows {
     ) -> Option<Vec<TileRuns>> {
         let about = part.len() * RUNS_PER_PRIMITIVE / bands;
         let mut runs = host::collect((0..bands).map(|_| TileRuns::with_room(about)));
-        let others = self.places.len() - 1;
-        // Inline rows without tiles may lie outside of the bounds.
-        let place = |row: u32| self.places[(row.wrapping_sub(self.first) as usize).min(others)];
         let reach_of = |&(_, primitive): &(u32, u32)| {
             let (group, place) = locate(primitive);
             &groups.reaches[group][place]
@@ -322,7 +324,6 @@ impl Rows {
         let Some(first) = part.first() else {
             return Some(runs);
         };
-        let is_one_band = bands == 1;
         let mut ahead = [reach_of(first); GATHERED];
         let mut next = part.chunks(GATHERED);
         // Footprints are scattered in memory, so they are prefetched.
@@ -337,39 +338,82 @@ impl Rows {
             let reaches = ahead;
             fetch(&mut ahead);
             let before = written(&runs);
-            for (&(_, primitive), reach) in some.iter().zip(reaches) {
-                if let Some((row, spans)) = reach.held() {
-                    let (band, row_start) = place(row);
-                    if is_one_band || band == place(row + HELD_ROWS as u32 - 1).0 {
-                        let runs = &mut runs[band as usize];
-                        runs.push_rows(row_start, spans, self.columns, primitive);
-                        continue;
-                    }
-                }
-                let others = groups.spans[locate(primitive).0];
-                for (row, span) in reach.spans(others).filter(|(_, span)| span.len() > 0) {
-                    let (band, row_start) = place(row);
-                    runs[band as usize].push(TileRun::new(row_start, span.into(), primitive));
-                }
+            if let [runs] = &mut *runs {
+                self.expand_to_one(groups, some, &reaches, runs);
+            } else {
+                self.expand_to_bands(groups, some, &reaches, &mut runs);
             }
             if !allow((written(&runs) - before) as u64) {
                 return None;
             }
         }
+        runs.iter_mut().for_each(TileRuns::settle);
         Some(runs)
+    }
+
+    /// Adds the runs of `some` primitives, whose footprints are `reaches`, to those of the only band.
+    #[inline(always)]
+    fn expand_to_one(
+        &self,
+        groups: &Groups<'_>,
+        some: &[(u32, u32)],
+        reaches: &[&TileFootprint; GATHERED],
+        runs: &mut TileRuns,
+    ) {
+        // Inline rows without tiles may lie outside of the bounds.
+        let row_start = |row: u32| row.wrapping_sub(self.first).wrapping_mul(self.columns);
+        for (&(_, primitive), reach) in some.iter().zip(reaches) {
+            if let Some((row, spans)) = reach.held() {
+                runs.push_rows(row_start(row), spans, self.columns, primitive);
+            } else {
+                let others = groups.spans[locate(primitive).0];
+                for (row, span) in reach.spans(others) {
+                    runs.push(row_start(row), span, primitive);
+                }
+            }
+        }
+    }
+
+    /// Adds the runs of `some` primitives, whose footprints are `reaches`, to those of their bands.
+    fn expand_to_bands(
+        &self,
+        groups: &Groups<'_>,
+        some: &[(u32, u32)],
+        reaches: &[&TileFootprint; GATHERED],
+        runs: &mut [TileRuns],
+    ) {
+        let others = self.places.len() - 1;
+        // Inline rows without tiles may lie outside of the bounds.
+        let place = |row: u32| self.places[(row.wrapping_sub(self.first) as usize).min(others)];
+        for (&(_, primitive), reach) in some.iter().zip(reaches) {
+            if let Some((row, spans)) = reach.held() {
+                let (band, row_start) = place(row);
+                if band == place(row + HELD_ROWS as u32 - 1).0 {
+                    let runs = &mut runs[band as usize];
+                    runs.push_rows(row_start, spans, self.columns, primitive);
+                    continue;
+                }
+            }
+            let others = groups.spans[locate(primitive).0];
+            for (row, span) in reach.spans(others) {
+                let (band, row_start) = place(row);
+                runs[band as usize].push(row_start, span, primitive);
+            }
+        }
     }
 }
 
 /// The number of runs that are written in all bands.
 fn written(runs: &[TileRuns]) -> usize {
-    runs.iter().map(|runs| runs.len).sum()
+    runs.iter().map(|runs| runs.runs.len() + runs.len).sum()
 }
 
 impl TileRuns {
     /// Makes an empty list with capacity for about `count` runs.
     fn with_room(count: usize) -> Self {
         Self {
-            runs: host::filled(TileRun::default(), count.max(1024)),
+            runs: host::with_capacity(count),
+            waiting: Box::new([TileRun::default(); WAITING]),
             len: 0,
         }
     }
@@ -384,38 +428,42 @@ impl TileRuns {
         columns: u32,
         primitive: u32,
     ) {
-        if self.runs.len() < self.len + HELD_ROWS {
-            self.grow();
+        if self.len > WAITING - HELD_ROWS {
+            self.settle();
         }
-        let room = &mut self.runs[self.len..self.len + HELD_ROWS];
+        let room = &mut self.waiting[self.len..self.len + HELD_ROWS];
         let mut len = 0;
         for span in spans {
-            let run = TileRun::new(row_start, span, primitive);
             // A run without tiles is overwritten by the next.
-            room[len] = run;
-            len += usize::from(run.first < run.end);
+            room[len] = TileRun::new(row_start, span, primitive);
+            len += usize::from(!span.is_empty());
             row_start = row_start.wrapping_add(columns);
         }
         self.len += len;
     }
 
-    /// Adds a run.
-    fn push(&mut self, run: TileRun) {
-        if self.len == self.runs.len() {
-            self.grow();
+    /// Adds the run of a span, if it has tiles. The first tile of its row has number `row_start`.
+    fn push(&mut self, row_start: u32, span: TileSpan, primitive: u32) {
+        if span.len() == 0 {
+            return;
         }
-        self.runs[self.len] = run;
+        if self.len == WAITING {
+            self.settle();
+        }
+        self.waiting[self.len] = TileRun::new(row_start, span.into(), primitive);
         self.len += 1;
     }
 
-    #[cold]
-    fn grow(&mut self) {
-        let len = 2 * self.runs.len();
-        host::resize(&mut self.runs, len, TileRun::default());
+    /// Appends the waiting runs to the others.
+    #[inline(never)]
+    fn settle(&mut self) {
+        host::extend(&mut self.runs, &self.waiting[..self.len]);
+        self.len = 0;
     }
 
-    fn written(&self) -> &[TileRun] {
-        &self.runs[..self.len]
+    /// The runs that do not wait.
+    fn settled(&self) -> &[TileRun] {
+        &self.runs
     }
 }
 
@@ -458,6 +506,7 @@ impl RowBand {
         for runs in runs {
             for &run in *runs {
                 let [first, end] = run.tiles();
+                let count = run.tiles.len();
                 // Most runs have one tile or two, which is hard to predict. An unwanted entry is overwritten by the
                 // next.
                 let mut put = |tile: usize, wanted: bool| {
@@ -466,9 +515,9 @@ impl RowBand {
                     ends[tile] = end + u32::from(wanted);
                 };
                 put(first, true);
-                put(first + 1, first + 1 < end);
-                for tile in first + 2..end {
-                    put(tile, true);
+                put(first + 1, count > 1);
+                if count > 2 {
+                    (first + 2..end).for_each(|tile| put(tile, true));
                 }
             }
         }

@@ -1,8 +1,15 @@
 //! The search for the tiles that a group's kept Gaussians reach: for several Gaussians at once if they are small, as
 //! most are; for several rows of one Gaussian at once if it is tall; and one at a time otherwise.
+//!
+//! Several at once are searched in binary32. An ellipse is made larger by a bound of all rounding errors, so that no
+//! tile is missed; [the derivation](../../../docs/precision.md) is in the documentation. Ellipses for which the bound
+//! does not hold are searched one at a time, in binary64.
+
+#[cfg(test)]
+mod tests;
 
 use super::camera::ViewConstants;
-use super::footprint::{Ellipse, HELD_ROWS, PackedSpan, TileFootprint, TileSpan};
+use super::footprint::{FIRST_TILE_BITS, HELD_ROWS, PackedSpan, TileFootprint, TileSpan};
 use super::lanes::{Bits, GroupF64};
 use super::panorama;
 use super::scratch::{Scratch, ScreenGaussians};
@@ -15,11 +22,18 @@ use crate::stats::counters::{Counter, Counters};
 use crate::stats::optimizations::Optimization;
 use fearless_simd::{Simd, prelude::*};
 
-/// The sum of this and an integer below 2^52 has the integer in its low bits.
-const POINT: f64 = (1u64 << 52) as f64;
+/// The sum of this and a whole number below it has the number in its low bits.
+const POINT: f32 = (1u32 << 23) as f32;
 
-/// A bound of magnitudes that keeps squares from overflow.
-const MODERATE: f64 = 1e100;
+/// The bound of the errors of an ellipse's places in pixels, relative to its size plus one pixel.
+const MARGIN: f32 = 1.0 / (1u32 << 19) as f32;
+
+/// The greatest size that is searched in binary32: the distance from the origin to the farthest point, at most.
+const MOST_SIZE: f32 = (1u32 << 17) as f32;
+
+/// The least variance in px^2, and the least determinant in px^4, that are searched in binary32. No intermediate result
+/// overflows or underflows.
+const LEAST_VARIANCE: f32 = 1.0 / (1u64 << 40) as f32;
 
 /// The result of searching several lanes at once.
 struct Found {
@@ -33,22 +47,22 @@ struct Found {
 
 /// The first and the last pixel along an axis, and their tiles.
 struct Range<S: Simd> {
-    low: S::f64s,
-    high: S::f64s,
-    first: S::f64s,
-    last: S::f64s,
+    low: S::f32s,
+    high: S::f32s,
+    first: S::f32s,
+    last: S::f32s,
     /// True if there are pixels.
-    any: S::mask64s,
+    any: S::mask32s,
 }
 
 impl<S: Simd> Range<S> {
     /// The integers of `first..=last` whose pixel centres are between `low` and `high`, in the same steps as in
     /// [`footprint`](super::footprint).
     #[inline(always)]
-    fn new(low: S::f64s, high: S::f64s, [first, last]: [S::f64s; 2]) -> Self {
+    fn new(low: S::f32s, high: S::f32s, [first, last]: [S::f32s; 2]) -> Self {
         let low = (low - 0.5).ceil().max(first);
         let high = (high - 0.5).floor().min(last);
-        let per_pixel = 1.0 / f64::from(TILE_SIZE);
+        let per_pixel = 1.0 / TILE_SIZE as f32;
         Self {
             low,
             high,
@@ -60,47 +74,119 @@ impl<S: Simd> Range<S> {
 
     /// The number of tiles.
     #[inline(always)]
-    fn tiles(&self) -> S::f64s {
+    fn tiles(&self) -> S::f32s {
         self.last - self.first + 1.0
-    }
-
-    /// The span of its tiles, as the number whose bits are a [`PackedSpan`].
-    #[inline(always)]
-    fn span(&self) -> S::f64s {
-        self.first + (self.last + 1.0) * 65536.0
     }
 }
 
-/// Ellipses whose tiles are searched row by row; see [`Ellipse`].
+/// Whole numbers below [`POINT`] as integers.
+#[inline(always)]
+fn integers<S: Simd>(simd: S, values: S::f32s) -> S::u32s {
+    let point = S::f32s::splat(simd, POINT);
+    (values + point).bitcast::<S::u32s>() - point.bitcast::<S::u32s>()
+}
+
+/// The bits of [`PackedSpan`]s of a number of tiles from a first one on.
+#[inline(always)]
+fn spans<S: Simd>(simd: S, first: S::f32s, tiles: S::f32s) -> S::u32s {
+    integers(simd, first) | (integers(simd, tiles) << FIRST_TILE_BITS)
+}
+
+/// Covariances in the picture and where they are cut off: see [`ScreenGaussians`].
+struct Shapes<S: Simd> {
+    mean: [S::f32s; 2],
+    covariance: [S::f32s; 3],
+    determinant: S::f32s,
+    extent: S::f32s,
+}
+
+impl<S: Simd> Shapes<S> {
+    /// The shapes that `load` finds in the arrays of all lanes.
+    #[inline(always)]
+    fn new(flat: &ScreenGaussians, load: impl Fn(&GroupF64) -> S::f32s) -> Self {
+        let ([x, y], [xx, xy, yy]) = (&flat.mean, &flat.covariance);
+        Self {
+            mean: [load(x), load(y)],
+            covariance: [load(xx), load(xy), load(yy)],
+            determinant: load(&flat.determinant),
+            extent: load(&flat.extent),
+        }
+    }
+}
+
+/// Ellipses whose tiles are searched row by row; see [`Ellipse`](super::footprint::Ellipse). They are larger than the
+/// exact ones by more than all rounding errors.
 struct Ellipses<S: Simd> {
-    mean: [S::f64s; 2],
-    slope: S::f64s,
-    narrowing: S::f64s,
-    peak: S::f64s,
+    mean: [S::f32s; 2],
+    slope: S::f32s,
+    narrowing: S::f32s,
+    peak: S::f32s,
     /// The square of the half extent in y.
-    square: S::f64s,
+    square: S::f32s,
+    /// The bound of the errors of the columns.
+    margin: S::f32s,
+    /// The columns of pixels.
+    across: Range<S>,
     /// The rows of pixels.
     along: Range<S>,
     /// The first and the last visible column of pixels.
-    columns: [S::f64s; 2],
+    columns: [S::f32s; 2],
+    /// True if there is an ellipse: the square root of a negative extent is NaN.
+    exists: S::mask32s,
+    /// True if the bound of the errors holds.
+    is_moderate: S::mask32s,
 }
 
 impl<S: Simd> Ellipses<S> {
-    /// The columns that each ellipse reaches in a row of tiles. The mask is true if the row belongs to the ellipse and
-    /// the ellipse reaches a pixel centre there. The steps are those of [`Ellipse::reach`].
+    /// The ellipses of some shapes.
     #[inline(always)]
-    fn row(&self, simd: S, row: S::f64s) -> (Range<S>, S::mask64s) {
-        let number = |value: f64| S::f64s::splat(simd, value);
-        let (zero, tile) = (number(0.0), f64::from(TILE_SIZE));
+    fn new(view: &ViewConstants, simd: S, shapes: &Shapes<S>) -> Self {
+        let number = |value: f32| S::f32s::splat(simd, value);
+        let pixels = |axis| both(view.visible.pixels(axis), |pixel| number(pixel as f32));
+        let (columns, rows) = (pixels(0), pixels(1));
+        let ([x, y], [a, b, c]) = (shapes.mean, shapes.covariance);
+        let (per_a, per_c) = (number(1.0) / a, number(1.0) / c);
+        let (half_x, half_y) = ((a * shapes.extent).sqrt(), (c * shapes.extent).sqrt());
+        let size = x.abs() + y.abs() + half_x + half_y;
+        let least = a.min(c).min(shapes.determinant);
+        let slope = b * per_c;
+        let margin = size * MARGIN + MARGIN;
+        let (wide, tall) = (half_x + margin, half_y + margin);
+        // See the derivation for the factor.
+        let rise = half_y + margin * 3.0;
+        Self {
+            mean: [x, y],
+            slope,
+            narrowing: shapes.determinant * per_c * per_c,
+            peak: b * per_a * half_x,
+            square: rise * rise,
+            margin: slope.abs().mul_add(margin, margin),
+            across: Range::new(x - wide, x + wide, columns),
+            along: Range::new(y - tall, y + tall, rows),
+            columns,
+            exists: half_y.simd_ge(0.0),
+            is_moderate: size.simd_le(MOST_SIZE) & least.simd_ge(LEAST_VARIANCE),
+        }
+    }
+
+    /// The columns that each ellipse reaches in a row of tiles. The mask is true if the row belongs to the ellipse and
+    /// the ellipse reaches a pixel centre there. The steps are those of
+    /// [`Ellipse::reach`](super::footprint::Ellipse::reach).
+    #[inline(always)]
+    fn row(&self, simd: S, row: S::f32s) -> (Range<S>, S::mask32s) {
+        let number = |value: f32| S::f32s::splat(simd, value);
+        let (zero, tile) = (number(0.0), TILE_SIZE as f32);
         let [x, y] = self.mean;
         let row_top = row * tile;
         let above = self.along.low.max(row_top) + 0.5 - y;
         let below = self.along.high.min(row_top + (tile - 1.0)) + 0.5 - y;
-        // See [`Ellipse::sides`].
+        // Each side is monotonic above and below its furthest point, at height -peak and peak.
         let to_left = (zero - self.peak).max(above).min(below);
         let to_right = self.peak.max(above).min(below);
-        let width =
-            |height: S::f64s| (self.narrowing * (self.square - height * height).max(zero)).sqrt();
+        let width = |height: S::f32s| {
+            let square = height.mul_add(zero - height, self.square);
+            (self.narrowing * square.max(zero)).sqrt() + self.margin
+        };
         let low = x + (self.slope * to_left - width(to_left));
         let high = x + (self.slope * to_right + width(to_right));
         let range = Range::new(low, high, self.columns);
@@ -179,6 +265,7 @@ fn find_tiles_by<S: Simd>(
             }
         },
     );
+    out.counters.add(Counter::TilesFoundWide, left.count());
     scratch.copies.clear();
     left.for_each(|at| {
         if let Some(reach) = reach_of_one(view, at, scratch, out, &mut beside) {
@@ -236,8 +323,9 @@ fn find_drawn<S: Simd>(
     seen.and(&definite)
 }
 
-/// The footprints of the lanes of `drawn` that reach at most [`HELD_ROWS`] rows of tiles. The results and steps are
-/// those of [`Ellipse::reach`]. Adds the number of tiles of bounding boxes that ellipses do not reach to `beside`.
+/// The footprints of the lanes of `drawn` that reach at most [`HELD_ROWS`] rows of tiles. The steps are those of
+/// [`Ellipse::reach`](super::footprint::Ellipse::reach). Adds the number of tiles of bounding boxes that ellipses do
+/// not reach to `beside`.
 #[inline(always)]
 fn reach_in_lanes<S: Simd>(
     view: &ViewConstants,
@@ -246,9 +334,7 @@ fn reach_in_lanes<S: Simd>(
     scratch: &mut Scratch,
     beside: &mut u64,
 ) -> Found {
-    let number = |value: f64| S::f64s::splat(simd, value);
-    let columns = both(view.visible.pixels(0), number);
-    let rows = both(view.visible.pixels(1), number);
+    let number = |value: f32| S::f32s::splat(simd, value);
     let (zero, one) = (number(0.0), number(1.0));
     let mut found = Found {
         reached: Bits::default(),
@@ -256,93 +342,77 @@ fn reach_in_lanes<S: Simd>(
         left: Bits::default(),
     };
     let mut apart = zero;
-    for at in (0..scratch.lanes.len()).step_by(S::f64s::LEN) {
-        let load = |lanes: &GroupF64| S::f64s::from_slice(simd, &lanes[at..at + S::f64s::LEN]);
-        let ScreenGaussians {
-            mean,
-            half,
-            slope,
-            narrowing,
-            peak,
-            ..
-        } = &*scratch.flat;
-        let (x, y) = (load(&mean[0]), load(&mean[1]));
-        let (half_x, half_y) = (load(&half[0]), load(&half[1]));
-        let (slope, narrowing, peak) = (load(slope), load(narrowing), load(peak));
-        let drawn = S::mask64s::from_bitmask(simd, drawn.group(at, S::f64s::LEN));
-        // The square root of a negative extent is NaN.
-        let drawn = drawn & half_y.simd_ge(zero);
-        let size = x.abs() + y.abs() + half_x + half_y + slope.abs() + narrowing + peak.abs();
-        let moderate = size.simd_le(number(MODERATE));
-
-        let across = Range::<S>::new(x - half_x, x + half_x, columns);
-        let along = Range::<S>::new(y - half_y, y + half_y, rows);
-        let inside = drawn & moderate & across.any & along.any;
-        let (wide, tall) = (across.tiles(), along.tiles());
-        let short = tall.simd_le(number(HELD_ROWS as f64));
-        found.left.set(at, drawn & !moderate);
-        found.tall.set(at, inside & !short);
-        let clipped = across.low.simd_eq(columns[0])
-            | across.high.simd_eq(columns[1])
-            | along.low.simd_eq(rows[0])
-            | along.high.simd_eq(rows[1]);
-        let single = wide.simd_eq(one) & tall.simd_eq(one) & !clipped;
-
-        let ellipses = Ellipses::<S> {
-            mean: [x, y],
-            slope,
-            narrowing,
-            peak,
-            square: half_y * half_y,
-            along,
-            columns,
+    for at in (0..scratch.lanes.len()).step_by(S::f32s::LEN) {
+        let load = |lanes: &GroupF64| {
+            let half = |at: usize| S::f64s::from_slice(simd, &lanes[at..at + S::f64s::LEN]);
+            half(at).narrow(half(at + S::f64s::LEN))
         };
-        let along = &ellipses.along;
+        let ellipses = Ellipses::<S>::new(view, simd, &Shapes::new(&scratch.flat, load));
+        let drawn = S::mask32s::from_bitmask(simd, drawn.group(at, S::f32s::LEN));
+        let drawn = drawn & ellipses.exists;
+        let (across, along) = (&ellipses.across, &ellipses.along);
+        let inside = drawn & ellipses.is_moderate & across.any & along.any;
+        let (wide, tall) = (across.tiles(), along.tiles());
+        let short = tall.simd_le(HELD_ROWS as f32);
+        found.left.set(at, drawn & !ellipses.is_moderate);
+        found.tall.set(at, inside & !short);
+        let [first_row, last_row] = view.visible.pixels(1).map(|pixel| pixel as f32);
+        let clipped = across.low.simd_eq(ellipses.columns[0])
+            | across.high.simd_eq(ellipses.columns[1])
+            | along.low.simd_eq(first_row)
+            | along.high.simd_eq(last_row);
+        let single = wide.simd_eq(one) & tall.simd_eq(one) & !clipped;
+        let told = inside & short;
+
         let mut row = along.first;
         let mut reached = zero;
-        let mut spans = [zero; HELD_ROWS];
-        for (number, span) in spans.iter_mut().enumerate() {
+        let mut words = [S::u32s::splat(simd, 0); HELD_ROWS];
+        for (number, word) in words.iter_mut().enumerate() {
             // Most have one or two rows.
-            let any = inside & short & row.simd_le(along.last);
-            if !any.any_true() {
+            if !(told & row.simd_le(along.last)).any_true() {
                 break;
             }
             let (across_row, within) = ellipses.row(simd, row);
-            *span = within.select(across_row.span(), zero);
-            reached += within.select(across_row.tiles(), zero);
+            let mut first = within.select(across_row.first, zero);
+            let mut tiles = within.select(across_row.tiles(), zero);
             if number == 0 {
-                *span = single.select(across.span(), *span);
-                reached = single.select(one, reached);
+                first = single.select(across.first, first);
+                tiles = single.select(one, tiles);
             }
+            *word = spans(simd, first, tiles);
+            reached += tiles;
             row += 1.0;
         }
-        let told = inside & short;
-        let any = told & reached.simd_gt(zero);
-        found.reached.set(at, any);
+        found.reached.set(at, told & reached.simd_gt(zero));
         let more = (wide * tall - reached).max(zero);
         apart += (told & !single).select(more, zero);
 
-        let head = along.first + tall * 65536.0;
-        let bits = |value: S::f64s| -> S::u64s { (value + POINT).bitcast() };
-        let point: S::u64s = number(POINT).bitcast();
-        let [first, second, third] = spans;
-        let [words, more_words] = &mut scratch.reaches.0;
-        let word = (bits(head) - point) | (bits(first) << 32);
-        word.store_slice(&mut words[at..at + S::f64s::LEN]);
-        let word = (bits(second) - point) | (bits(third) << 32);
-        word.store_slice(&mut more_words[at..at + S::f64s::LEN]);
+        let rows = integers(simd, along.first) | (integers(simd, tall) << 16);
+        let [first, second, third] = words;
+        // A lane's four words follow one another.
+        let (rows, more_rows) = rows.interleave(second);
+        let (others, more_others) = first.interleave(third);
+        let (first, second) = rows.interleave(others);
+        let (third, fourth) = more_rows.interleave(more_others);
+        let words = scratch.reaches.0[at..at + S::f32s::LEN].as_flattened_mut();
+        let parts = words.chunks_exact_mut(S::u32s::LEN);
+        for (part, words) in parts.zip([first, second, third, fourth]) {
+            words.store_slice(part);
+        }
     }
-    for lane in 0..S::f64s::LEN {
-        *beside += apart.as_slice()[lane] as u64;
+    for &apart in apart.as_slice() {
+        *beside += apart as u64;
     }
     found
 }
 
 /// The lane numbers of a vector.
-const NUMBERS: [f64; 8] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
+const NUMBERS: [f32; 16] = [
+    0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0,
+];
 
 /// The footprint of a lane that [`reach_in_lanes`] found to be tall, if it reaches tiles: several rows at once, in the
-/// steps of [`Ellipse::reach`].
+/// steps of [`Ellipse::reach`](super::footprint::Ellipse::reach).
 #[inline(always)]
 fn reach_by_rows<S: Simd>(
     view: &ViewConstants,
@@ -352,42 +422,33 @@ fn reach_by_rows<S: Simd>(
     others: &mut Vec<TileSpan>,
     beside: &mut u64,
 ) -> Option<TileFootprint> {
-    let number = |value: f64| S::f64s::splat(simd, value);
-    let flat = &*scratch.flat;
-    let (x, y) = (number(flat.mean[0][at]), number(flat.mean[1][at]));
-    let (half_x, half_y) = (number(flat.half[0][at]), number(flat.half[1][at]));
-    let columns = both(view.visible.pixels(0), number);
-    let across = Range::<S>::new(x - half_x, x + half_x, columns);
-    let rows = both(view.visible.pixels(1), number);
-    let ellipses = Ellipses::<S> {
-        mean: [x, y],
-        slope: number(flat.slope[at]),
-        narrowing: number(flat.narrowing[at]),
-        peak: number(flat.peak[at]),
-        square: half_y * half_y,
-        along: Range::new(y - half_y, y + half_y, rows),
-        columns,
-    };
+    let number = |value: f32| S::f32s::splat(simd, value);
+    let load = |lanes: &GroupF64| number(lanes[at] as f32);
+    let ellipses = Ellipses::<S>::new(view, simd, &Shapes::new(&scratch.flat, load));
     let along = &ellipses.along;
-    let whole = |value: S::f64s| value.as_slice()[0] as u64;
+    let whole = |value: S::f32s| value.as_slice()[0] as u64;
     let (first, count) = (whole(along.first), whole(along.tiles()) as usize);
     let reach = TileFootprint::new(first as u16, count as u16, others);
-    let spans = others.len() - count;
-    let spans = &mut others[spans..];
-    let (zero, point) = (number(0.0), number(POINT));
-    let mut row = along.first + S::f64s::from_slice(simd, &NUMBERS[..S::f64s::LEN]);
+    let first_span = others.len() - count;
+    let zero = number(0.0);
+    let mut row = along.first + S::f32s::from_slice(simd, &NUMBERS[..S::f32s::LEN]);
     let mut reached = zero;
-    for spans in spans.chunks_mut(S::f64s::LEN) {
+    for of_rows in others[first_span..].chunks_mut(S::f32s::LEN) {
         let (across_row, within) = ellipses.row(simd, row);
-        let bits: S::u64s = (within.select(across_row.span(), zero) + point).bitcast();
-        for (span, &bits) in spans.iter_mut().zip(bits.as_slice()) {
-            *span = PackedSpan::from_bits(bits as u32).into();
+        let tiles = within.select(across_row.tiles(), zero);
+        let bits = spans(simd, within.select(across_row.first, zero), tiles);
+        for (span, &bits) in of_rows.iter_mut().zip(bits.as_slice()) {
+            *span = PackedSpan::from_bits(bits).into();
         }
-        reached += within.select(across_row.tiles(), zero);
-        row += S::f64s::LEN as f64;
+        reached += tiles;
+        row += S::f32s::LEN as f32;
     }
-    let reached = reached.as_slice().iter().sum::<f64>() as u64;
-    let all = count as u64 * whole(across.tiles());
+    let reached = reached
+        .as_slice()
+        .iter()
+        .map(|&tiles| tiles as u64)
+        .sum::<u64>();
+    let all = count as u64 * whole(ellipses.across.tiles());
     *beside += all.saturating_sub(reached);
     (reached > 0).then_some(reach)
 }
@@ -404,14 +465,7 @@ fn reach_of_one(
     if view.geometry == GaussianGeometry::Surfel {
         return surfel_of(view, at, scratch, &mut out.spans).1;
     }
-    let flat = &*scratch.flat;
-    let ellipse = Ellipse {
-        mean: [flat.mean[0][at], flat.mean[1][at]],
-        half: [flat.half[0][at], flat.half[1][at]],
-        slope: flat.slope[at],
-        narrowing: flat.narrowing[at],
-        peak: flat.peak[at],
-    };
+    let ellipse = scratch.flat.ellipse(at);
     // The square root of a negative extent is NaN.
     if ellipse.half[1].is_nan() {
         return None;
@@ -425,164 +479,6 @@ fn reach_of_one(
         Some(period) => {
             let (visible, copies) = (&view.visible, &mut scratch.copies);
             panorama::reach(at, &ellipse, period, visible, copies, out, beside)
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::footprint::Visible;
-    use super::*;
-    use crate::runtime::SimdLevel;
-    use crate::state::Viewport;
-    use crate::state::gaussian::{Camera, GaussianState};
-    use crate::stats::optimizations::Optimizations;
-    use devmem::dispatch;
-    use proptest::prelude::*;
-
-    /// The rows, each with its first tile and one past its last.
-    type Spans = Vec<(u32, u16, u16)>;
-
-    /// The result for a group: the spans of each lane that reaches tiles, and the counters.
-    #[derive(Debug, PartialEq)]
-    struct Tiles {
-        reached: Vec<(usize, Spans)>,
-        counters: Vec<u64>,
-    }
-
-    fn projection() -> ViewConstants {
-        let visible = Visible {
-            left: 3,
-            top: 0,
-            right: 200,
-            bottom: 150,
-        };
-        let camera = Camera {
-            far_plane: 50.0,
-            ..Camera::default()
-        };
-        let viewport = Viewport {
-            x: 0.0,
-            y: 0.0,
-            width: 200.0,
-            height: 150.0,
-            min_depth: 0.0,
-            max_depth: 1.0,
-        };
-        let state = GaussianState::default();
-        ViewConstants::new(
-            &state,
-            &camera,
-            &viewport,
-            visible,
-            None,
-            Optimizations::ALL,
-        )
-    }
-
-    fn tiles<S: Simd>(simd: S, by_lanes: bool, scratch: &mut Scratch) -> Tiles {
-        let mut out = ProjectedGroup::default();
-        find_tiles_by(&projection(), simd, by_lanes, scratch, &mut out);
-        let spans = |at: usize| {
-            let reach = scratch.reaches.get(at);
-            let spans = reach.spans(&out.spans);
-            let spans = spans.map(|(row, span)| (row, span.first, span.end));
-            spans.filter(|(_, first, end)| first < end).collect()
-        };
-        let counters = Counter::ALL.iter();
-        Tiles {
-            reached: scratch.reached.iter().map(|&at| (at, spans(at))).collect(),
-            counters: counters.map(|&counter| out.counters.get(counter)).collect(),
-        }
-    }
-
-    /// Typical coordinates, those at edges of pixels and tiles, and invalid ones.
-    fn place() -> impl Strategy<Value = f64> {
-        prop_oneof![
-            8 => -30.0..230.0f64,
-            8 => (-20..500i32).prop_map(|halves| 0.5 * f64::from(halves)),
-            1 => prop_oneof![Just(f64::NAN), Just(f64::INFINITY), Just(-1e200), Just(1e17)],
-        ]
-    }
-
-    /// Standard deviations along both axes, in pixels, and the angle of the first axis.
-    fn shape() -> impl Strategy<Value = [f64; 3]> {
-        (0.05..12.0f64, 0.05..6.0f64, 0.0..3.2f64).prop_map(|(a, b, angle)| [a, b, angle])
-    }
-
-    proptest! {
-        #[test]
-        fn lanes_find_what_one_at_a_time_finds(
-            lanes in prop::collection::vec(
-                ([place(), place()], shape(), prop_oneof![9 => 0.1..40.0f64, 1 => -1.0..0.0f64], 0.1..60.0f64),
-                1..40,
-            ),
-            odd in (0..40usize, prop_oneof![Just(f64::NAN), Just(f64::INFINITY), Just(-1.0), Just(1e120)]),
-        ) {
-            let mut scratch = Scratch::new();
-            for (at, &(mean, [p, q, angle], extent, depth)) in lanes.iter().enumerate() {
-                let (sin, cos) = angle.sin_cos();
-                let [p, q] = [p * p, q * q];
-                let [a, b, c] = [p * cos * cos + q * sin * sin, (p - q) * sin * cos, p * sin * sin + q * cos * cos];
-                let flat = &mut *scratch.flat;
-                flat.mean[0][at] = mean[0];
-                flat.mean[1][at] = mean[1];
-                flat.determinant[at] = a * c - b * b;
-                flat.half[0][at] = (a * extent).sqrt();
-                flat.half[1][at] = (c * extent).sqrt();
-                flat.slope[at] = b / c;
-                flat.narrowing[at] = flat.determinant[at] / (c * c);
-                flat.peak[at] = b * (extent / a).sqrt();
-                scratch.depth[at] = depth;
-                scratch.lanes.push(at);
-            }
-            scratch.kept = Bits::first(lanes.len());
-            let (at, value) = odd;
-            let flat = &mut *scratch.flat;
-            match at % 4 {
-                0 => flat.determinant[at] = value,
-                1 => flat.half[0][at] = value,
-                2 => flat.narrowing[at] = value.abs(),
-                _ => scratch.depth[at] = value,
-            }
-            for (name, level) in SimdLevel::supported() {
-                let level = level.resolve().unwrap();
-                let [one, all] = [false, true].map(|by_lanes| {
-                    dispatch!(level, simd => tiles(simd, by_lanes, &mut scratch))
-                });
-                prop_assert_eq!(one, all, "{}", name);
-            }
-        }
-
-        #[test]
-        fn depths_are_compared_as_they_are_rounded(bits in any::<u32>(), ulps in -3..3i32) {
-            let value = f32::from_bits(bits);
-            prop_assume!(!value.is_nan());
-            let last = last_rounded_to(value);
-            prop_assert!(last as f32 <= value);
-            prop_assert!(last == f64::INFINITY || last.next_up() as f32 > value, "{last:e}");
-            let near = f64::from(value) * (1.0 + f64::from(ulps) / f64::from(1 << 24));
-            prop_assert_eq!(near as f32 <= value, near <= last, "{:e} {:e}", near, last);
-        }
-    }
-
-    #[test]
-    fn the_last_number_before_infinity_is_known() {
-        for value in [
-            f32::MAX,
-            f32::INFINITY,
-            f32::NEG_INFINITY,
-            f32::MIN,
-            0.0,
-            -0.0,
-            0.2,
-        ] {
-            let last = last_rounded_to(value);
-            assert!(last as f32 <= value, "{value}");
-            assert!(
-                last == f64::INFINITY || last.next_up() as f32 > value,
-                "{value}"
-            );
         }
     }
 }

@@ -67,6 +67,7 @@ counters! {
     GaussiansRead: "gaussians", "gaussians read", Count, "Gaussians that draws named";
     ClustersBuilt: "gaussians", "clusters built", Count, "Clusters of up to 256 Gaussians that were made of memory that is drawn again";
     GaussiansDrawn: "gaussians", "gaussians drawn", Count, "Gaussians that reached at least one tile";
+    TilesFoundWide: "gaussians", "tiles found in binary64", Count, "Gaussians whose tiles were searched in binary64, since the error of binary32 has no bound, or in a mode without a search in binary32";
     SkippedNonFinite: "gaussians skipped", "non-finite", Count, "Gaussians with a non-finite attribute";
     SkippedZeroRotation: "gaussians skipped", "zero quaternion", Count, "Gaussians whose quaternion is all zero";
     SkippedNegativeScale: "gaussians skipped", "negative scale", Count, "Gaussians with a negative scale";

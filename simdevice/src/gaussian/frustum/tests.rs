@@ -5,7 +5,7 @@ use crate::format::Format;
 use crate::gaussian::attributes::{CoefficientReader, Group, Harmonics};
 use crate::gaussian::footprint::Visible;
 use crate::gaussian::lanes::GROUP;
-use crate::gaussian::preprocess::{Source, project};
+use crate::gaussian::preprocess::{Sequence, Source, project};
 use crate::gaussian::scratch::Scratch;
 use crate::gaussian::splat::ProjectedGroup;
 use crate::gaussian::surfel::Surfel;
@@ -187,8 +187,8 @@ fn what_is_outside_is_drawn_nowhere() {
                 let mut out = ProjectedGroup::default();
                 let mut scratch = Scratch::new();
                 let outside = dispatch!(level, simd => {
-                    let lane = |lane: usize| lane as u32;
-                    project(&constants, simd, &source, &mut scratch, lane, &mut out);
+                    let sequence = Sequence::From(0);
+                    project(&constants, simd, &source, &mut scratch, sequence, &mut out);
                     frustum.lanes_outside(simd, &attributes, GROUP)
                 });
                 drawn += out.keys.len();

@@ -197,7 +197,7 @@ fn composite_round<'a, S: Simd, const DEPTH: DepthMode>(
         let evaluated = evaluate::<_, DEPTH>(
             accumulator,
             simd,
-            &placed.reaching,
+            (&placed.reaching, placed.is_capped),
             staged,
             ranges,
             task.thresholds,

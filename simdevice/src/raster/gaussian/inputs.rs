@@ -27,6 +27,9 @@ use std::slice;
 /// Powers of two are formed down to this one.
 const MOST_FALL: f64 = 126.0;
 
+/// A bound of the error of exponents of alphas that are at least a half.
+const CAP_MARGIN: f64 = 1e-4;
+
 /// The kernel's use of depths: a constant, so that what isn't done costs nothing. Each from [`NO_DEPTH`] on does what
 /// those from there to it do; before it are [`FAST_POWERS`] and [`FASTER_POWERS`].
 pub(super) type DepthMode = u8;
@@ -49,6 +52,8 @@ pub(super) struct Thresholds {
     /// For modes that compare alpha itself.
     pub(super) alpha_floor: f32,
     pub(super) alpha_ceiling: f32,
+    /// The base-2 logarithm of the opacity above which an alpha may be rounded to more than the ceiling.
+    pub(super) least_capped: f32,
     pub(super) transmittance_floor: f32,
     /// The encoding of depths as numbers.
     pub(super) depth_unit: DepthEncoding,
@@ -72,6 +77,7 @@ impl Thresholds {
             most_fall,
             alpha_floor: state.alpha_floor,
             alpha_ceiling: state.alpha_ceiling,
+            least_capped: (f64::from(state.alpha_ceiling).log2() - CAP_MARGIN) as f32,
             transmittance_floor: state.transmittance_floor,
         }
     }

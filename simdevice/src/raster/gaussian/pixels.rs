@@ -55,12 +55,13 @@ impl Default for Alphas {
 
 impl Alphas {
     /// Finds the alphas of all Gaussians in the blocks that they may reach. Returns the number of pixels that they
-    /// reach, of those that are not finished, and the number of pairs of a Gaussian and a block.
+    /// reach, of those that are not finished, and the number of pairs of a Gaussian and a block. Without `IS_CAPPED`,
+    /// alphas are not compared with the ceiling, which none may reach then.
     ///
     /// They come before any is composited, since they do not depend on each other: several are on their way at a time.
     /// A function of its own, so that its constants have the registers for themselves.
     #[inline(never)]
-    fn find<S: Simd, const DEPTH: DepthMode>(
+    fn find<S: Simd, const DEPTH: DepthMode, const IS_CAPPED: bool>(
         &mut self,
         simd: S,
         reaching: &Reaching,
@@ -94,8 +95,9 @@ impl Alphas {
                         let at = (block, round.looks[number].depth);
                         let reached = reached(simd, DEPTH, at, fall, ranges, most_fall);
                         pixels.add(reached);
-                        let alpha = alpha(simd, DEPTH, reached, fall, ceiling);
-                        alpha.store_slice(to);
+                        let power = power(simd, DEPTH, fall);
+                        let alpha = if IS_CAPPED { power.min(ceiling) } else { power };
+                        only(simd, reached, alpha).store_slice(to);
                     }
                 }
                 (pixels.total(), count_of_all)
@@ -146,18 +148,24 @@ pub(super) struct Evaluated {
     pub(super) may_have_finished: bool,
 }
 
-/// Composites those of `round` that reach a block in it, for each block.
+/// Composites those of `round` that reach a block in it, for each block. Unless `is_capped`, no opacity is above the
+/// ceiling.
 #[inline(always)]
 pub(super) fn evaluate<S: Simd, const DEPTH: DepthMode>(
     accumulator: &mut Accumulator,
     simd: S,
-    reaching: &Reaching,
+    (reaching, is_capped): (&Reaching, bool),
     (round, alphas): (&StagedRound, &mut Alphas),
     ranges: &DepthRanges,
     thresholds: Thresholds,
 ) -> Evaluated {
     let to = (round, &accumulator.most_fall);
-    let (reached, items) = alphas.find::<_, DEPTH>(simd, reaching, to, ranges, thresholds);
+    // Opacities are seldom above the ceiling. Less exact powers may be, whatever the opacity.
+    let (reached, items) = if DEPTH < NO_DEPTH || is_capped {
+        alphas.find::<_, DEPTH, true>(simd, reaching, to, ranges, thresholds)
+    } else {
+        alphas.find::<_, DEPTH, false>(simd, reaching, to, ranges, thresholds)
+    };
     let refused =
         composite_all::<_, DEPTH>(accumulator, simd, reaching, (round, alphas), thresholds);
     Evaluated {

@@ -4,7 +4,7 @@ use super::depth_ranges::DepthRanges;
 use super::grid::{
     BLOCK_PIXELS, BLOCKS, BLOCKS_ACROSS, BlockMiddles, HALF, LANE_X, LANE_Y, PLACES, ROUND,
 };
-use super::inputs::{DepthMode, NO_DEPTH, TileInputs};
+use super::inputs::{DepthMode, NO_DEPTH, Thresholds, TileInputs};
 use crate::gaussian::splat::{Splat, SplatLook};
 use crate::stats::optimizations::Optimization;
 use fearless_simd::{Simd, f32x8, f32x16, f64x4, i32x16, mask32x16, prelude::*, u32x16};
@@ -80,6 +80,8 @@ impl Default for Gathered {
 #[derive(Debug, Default)]
 pub(super) struct Placed {
     pub(super) reaching: Reaching,
+    /// True if the alphas of a Gaussian that reaches a block may reach the ceiling.
+    pub(super) is_capped: bool,
     /// The number of Gaussians placed.
     pub(super) count: u64,
     /// The number in the round of the first steep Gaussian from where they begin, or the round's length.
@@ -134,9 +136,12 @@ impl StagedRound {
                 placed.count = present.count_ones().into();
                 let middles = BlockMiddles::new(task.corner);
                 let mut reaching = [[0; ROUND / 8]; BLOCKS];
+                // A bit for each Gaussian whose alphas may reach the ceiling.
+                let mut capped = 0;
                 for first in (from / S::f32s::LEN * S::f32s::LEN..number).step_by(S::f32s::LEN) {
-                    let most_fall = task.thresholds.most_fall;
-                    self.find_blocks(simd, first, &middles, most_fall, &mut reaching);
+                    let of_tile = (&middles, task.thresholds);
+                    let some = self.find_blocks(simd, first, of_tile, &mut reaching);
+                    capped |= (some as u32) << (first % ROUND);
                 }
                 let mut reaching = u32x16::simd_from(simd, words_of(reaching));
                 if !task.optimizations.has(Optimization::Blocks) {
@@ -160,6 +165,7 @@ impl StagedRound {
                     .to_array()
                     .into_iter()
                     .fold(0, |any, word| any | word);
+                placed.is_capped = any & capped != 0;
                 while any != 0 {
                     let number = any.trailing_zeros() as usize;
                     any &= any - 1;
@@ -218,16 +224,15 @@ impl StagedRound {
     }
 
     /// Finds `u` and `v` of the Gaussians from number `first` on, as many as a vector has lanes, and which blocks each
-    /// may reach.
+    /// may reach. Returns a bit for each whose alphas may reach the ceiling.
     #[inline(always)]
     fn find_blocks<S: Simd>(
         &mut self,
         simd: S,
         first: usize,
-        middles: &BlockMiddles,
-        most_fall: f32,
+        (middles, thresholds): (&BlockMiddles, Thresholds),
         reaching: &mut ReachingBytes,
-    ) {
+    ) -> u64 {
         let lanes = first..first + S::f32s::LEN;
         let wide = |lanes: &[f64; ROUND]| -> Wide<S> {
             let middle = first + S::f64s::LEN;
@@ -249,8 +254,9 @@ impl StagedRound {
         // How far the exponent may fall, with a margin for rounding.
         let room = log2_opacity.mul_add(
             S::f32s::splat(simd, ROOM_FACTOR),
-            S::f32s::splat(simd, most_fall * ROOM_FACTOR + 1e-3),
+            S::f32s::splat(simd, thresholds.most_fall * ROOM_FACTOR + 1e-3),
         );
+        let capped = log2_opacity.simd_gt(thresholds.least_capped).to_bitmask();
         let (narrow_a, narrow_b, narrow_c) = (a.narrow(), b.narrow(), c.narrow());
         narrow_a.store_slice(&mut narrow[0][lanes.clone()]);
         narrow_b.store_slice(&mut narrow[1][lanes.clone()]);
@@ -281,6 +287,7 @@ impl StagedRound {
                 set_bits(&mut reaching[block], first, S::f32s::LEN, may_reach);
             }
         }
+        capped
     }
 
     /// The squares of `u` in a block's column of blocks.

@@ -436,6 +436,24 @@ fn it_does_so_where_pixels_end_at_once() {
 }
 
 #[test]
+fn it_does_so_where_opacities_are_about_the_ceiling() {
+    let state = GaussianState {
+        alpha_ceiling: 0.9,
+        ..defaults()
+    };
+    for above in [-3e-4, -1.01e-4, -0.99e-4, 0.0, 1e-6, 1e-3] {
+        check_changed(7, 300, &state, WHOLE, |draw| {
+            let sorted = Arc::get_mut(&mut draw.sorted).unwrap();
+            for splat in sorted.splats.iter_mut().flatten() {
+                splat.log2_opacity = (0.9f64.log2() + above) as f32;
+                // The alpha at the pixel's centre is the opacity.
+                splat.mean = splat.mean.map(|at| at.floor() + 0.5);
+            }
+        });
+    }
+}
+
+#[test]
 fn a_saturated_tile_fetches_no_more() {
     let device = Device::new(&Config::default()).unwrap();
     let mut tile = Box::new(GaussianTile::default());

@@ -74,3 +74,21 @@ fn lavapipe_is_benchmarked_where_it_is_installed() {
     assert!(text.contains("quads on lavapipe"), "{text}");
     assert_eq!(frames("quads on lavapipe"), 3);
 }
+
+#[gaurast_runner::test]
+fn frames_of_a_path_and_a_cold_picture_are_timed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let arguments = [
+        "path", "--count", "300", "--size", "40x30", "--frames", "14", "--csv", "path.csv",
+    ];
+    let output = bench(&folder, &arguments);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{errors}");
+    let text = String::from_utf8_lossy(&output.stdout);
+    for part in ["synthetic 300", "slowest/median", "read file", "PNG"] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    let csv = std::fs::read_to_string(folder.path().join("path.csv")).expect("written");
+    let rows = csv.lines().filter(|row| row.starts_with("synthetic 300,"));
+    assert_eq!(rows.count(), 14);
+}

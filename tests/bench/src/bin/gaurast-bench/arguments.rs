@@ -42,6 +42,33 @@ pub struct FramesArguments {
     pub json: Option<PathBuf>,
 }
 
+/// Arguments of the benchmark of a viewer's frames.
+#[derive(Args)]
+pub struct PathArguments {
+    /// Scene files
+    pub scenes: Vec<PathBuf>,
+
+    /// Gaussians of synthetic scenes, which are written to a file first
+    #[arg(long = "count", value_name = "N,N", value_delimiter = ',')]
+    pub counts: Vec<usize>,
+
+    /// The pictures' size in pixels
+    #[arg(long, value_name = "WxH", default_value = "1280x720")]
+    pub size: Size,
+
+    /// Frames of the path
+    #[arg(long, value_name = "N", default_value_t = 240, value_parser = clap::value_parser!(u32).range(13..=10_000))]
+    pub frames: u32,
+
+    /// Threads to draw with, 0 for one for each processor
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub threads: usize,
+
+    /// Writes every frame as a row
+    #[arg(long, value_name = "FILE.csv")]
+    pub csv: Option<PathBuf>,
+}
+
 /// Arguments of a sweep.
 #[derive(Args)]
 pub struct SweepArguments {

@@ -14,7 +14,9 @@ mod optimizations;
 mod output;
 mod pair;
 mod pareto;
+mod path;
 mod plot;
+mod ply;
 mod roofline;
 mod worker;
 mod workload;
@@ -23,7 +25,9 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use arguments::{FramesArguments, OptimizationsArguments, ParetoArguments, SweepArguments};
+use arguments::{
+    FramesArguments, OptimizationsArguments, ParetoArguments, PathArguments, SweepArguments,
+};
 use commands::{CommandsArguments, CommandsWorkerArguments};
 use counts::{CountsArguments, CountsError, WorkerArguments};
 use error::BenchError;
@@ -45,6 +49,8 @@ struct Arguments {
 enum Command {
     /// Draws whole frames and prints the times of their stages.
     Frames(FramesArguments),
+    /// Measures a viewer's frames: the first ones, the slowest one of a camera path, and the parts of a cold picture.
+    Path(PathArguments),
     /// Sweeps settings and peers over several scenes and plots run time against error.
     Pareto(ParetoArguments),
     /// Measures the growth of time and memory with Gaussians, pixels, overlap and the share outside the picture.
@@ -82,6 +88,7 @@ fn main() -> ExitCode {
 fn run(command: &Command) -> Result<(), BenchError> {
     match command {
         Command::Frames(arguments) => frames::run(arguments),
+        Command::Path(arguments) => path::run(arguments),
         Command::Pareto(arguments) => pareto::run(arguments),
         Command::Growth(arguments) => growth::run(arguments),
         Command::Optimizations(arguments) => optimizations::run(arguments),

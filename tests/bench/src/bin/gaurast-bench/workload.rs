@@ -133,13 +133,24 @@ impl Workload {
         Ok(scenes::shuffled_with(&scene, &unseen, SEED))
     }
 
-    /// `count` different views, in the order of the path.
+    /// `count` different views, in the order of the path: a few degrees from frame to frame, so that no result of the
+    /// last frame can be reused.
     pub fn views(&self, scene: &Scene, count: usize) -> Result<Vec<Camera>, BenchError> {
+        self.turning_views(scene, count, 0.05)
+    }
+
+    /// `count` views, in the order of the path. A camera that turns around a scene turns by `step` radians from view to
+    /// view.
+    pub fn turning_views(
+        &self,
+        scene: &Scene,
+        count: usize,
+        step: f64,
+    ) -> Result<Vec<Camera>, BenchError> {
         let size = self.size;
-        // A few degrees from frame to frame, so that no result of the last frame can be reused.
         let around = |camera: Camera, pivot: [f64; 3]| {
             (0..count)
-                .map(|frame| camera.turned(pivot, [0.0, 1.0, 0.0], 0.05 * frame as f64))
+                .map(|frame| camera.turned(pivot, [0.0, 1.0, 0.0], step * frame as f64))
                 .collect()
         };
         Ok(match &self.source {
