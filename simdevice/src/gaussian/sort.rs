@@ -295,7 +295,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    #[test]
+    #[gaurast_runner::test]
     fn bits_order_as_numbers_do() {
         let ascending = [
             f32::NEG_INFINITY,
@@ -319,7 +319,7 @@ mod tests {
     }
 
     proptest! {
-        #[test]
+        #[gaurast_runner::test]
         fn shared_work_is_the_same(
             lengths in prop::collection::vec(0usize..4000, 1..20),
             keys in prop_oneof![Just(1u32), Just(3), Just(1 << 9), Just(1 << 20), Just(u32::MAX)],
@@ -351,7 +351,7 @@ mod tests {
             prop_assert_eq!(seen.into_inner(), lists.iter().map(Vec::len).sum::<usize>());
         }
 
-        #[test]
+        #[gaurast_runner::test]
         fn it_is_a_stable_sort(keys in prop::collection::vec(prop_oneof![any::<u32>(), 0u32..4, Just(u32::MAX)], 0..300)) {
             let mut pairs: Vec<_> = keys.iter().zip(0..).map(|(&key, at)| (key, at)).collect();
             let mut expected = pairs.clone();

@@ -433,11 +433,12 @@ fn reach_of_one(
 mod tests {
     use super::super::footprint::Visible;
     use super::*;
-    use crate::runtime::SimdLevel;
     use crate::state::Viewport;
     use crate::state::gaussian::{Camera, GaussianState};
     use crate::stats::optimizations::Optimizations;
+    use crate::token_of;
     use devmem::dispatch;
+    use gaurast_runner::{Case, simd_levels};
     use proptest::prelude::*;
 
     /// The rows, each with its first tile and one past its last.
@@ -510,15 +511,16 @@ mod tests {
         (0.05..12.0f64, 0.05..6.0f64, 0.0..3.2f64).prop_map(|(a, b, angle)| [a, b, angle])
     }
 
-    proptest! {
-        #[test]
-        fn lanes_find_what_one_at_a_time_finds(
+    #[gaurast_runner::test(each = simd_levels())]
+    fn lanes_find_what_one_at_a_time_finds(case: &Case) {
+        let level = token_of(case);
+        proptest!(|(
             lanes in prop::collection::vec(
                 ([place(), place()], shape(), prop_oneof![9 => 0.1..40.0f64, 1 => -1.0..0.0f64], 0.1..60.0f64),
                 1..40,
             ),
             odd in (0..40usize, prop_oneof![Just(f64::NAN), Just(f64::INFINITY), Just(-1.0), Just(1e120)]),
-        ) {
+        )| {
             let mut scratch = Scratch::new();
             for (at, &(mean, [p, q, angle], extent, depth)) in lanes.iter().enumerate() {
                 let (sin, cos) = angle.sin_cos();
@@ -545,16 +547,15 @@ mod tests {
                 2 => flat.narrowing[at] = value.abs(),
                 _ => scratch.depth[at] = value,
             }
-            for (name, level) in SimdLevel::supported() {
-                let level = level.resolve().unwrap();
-                let [one, all] = [false, true].map(|by_lanes| {
-                    dispatch!(level, simd => tiles(simd, by_lanes, &mut scratch))
-                });
-                prop_assert_eq!(one, all, "{}", name);
-            }
-        }
+            let [one, all] = [false, true].map(|by_lanes| {
+                dispatch!(level, simd => tiles(simd, by_lanes, &mut scratch))
+            });
+            prop_assert_eq!(one, all);
+        });
+    }
 
-        #[test]
+    proptest! {
+        #[gaurast_runner::test]
         fn depths_are_compared_as_they_are_rounded(bits in any::<u32>(), ulps in -3..3i32) {
             let value = f32::from_bits(bits);
             prop_assume!(!value.is_nan());
@@ -566,7 +567,7 @@ mod tests {
         }
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn the_last_number_before_infinity_is_known() {
         for value in [
             f32::MAX,
