@@ -102,7 +102,7 @@ fn powers_of_two_are_nearly_the_nearest() {
 }
 
 #[gaurast_runner::test(each = simd_levels())]
-fn it_equals_its_definition_at_every_level(case: &Case) {
+fn it_equals_its_definition(case: &Case) {
     for seed in 40..43 {
         check(case, seed, 400, &state(), WHOLE);
     }
