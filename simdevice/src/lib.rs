@@ -41,3 +41,21 @@ pub use isa;
 pub use packet::Packet;
 pub use runtime::Config;
 pub use timing;
+
+/// The SIMD level of a test's variant, of `gaurast_runner::simd_levels`.
+#[cfg(test)]
+fn level_of(case: &gaurast_runner::Case) -> runtime::SimdLevel {
+    runtime::SimdLevel::from_name(case.variant()).expect("a level's name")
+}
+
+/// The token of [`level_of`].
+#[cfg(test)]
+fn token_of(case: &gaurast_runner::Case) -> fearless_simd::Level {
+    let token = level_of(case).resolve();
+    token.expect("a level of this processor")
+}
+
+#[cfg(test)]
+fn main() -> std::process::ExitCode {
+    gaurast_runner::main()
+}

@@ -395,7 +395,8 @@ fn bind(
 /// The state that a worker keeps from one macro-tile to the next.
 struct Worker {
     buffers: Buffers,
-    gaussians: Box<GaussianTile>,
+    /// Made for the first draw of Gaussians.
+    gaussians: Option<Box<GaussianTile>>,
     scratch: Scratch,
     counters: Counters,
 }
@@ -412,7 +413,7 @@ impl Worker {
                 depth: TileBuffer::new(size, pass.depth.as_ref()),
                 stencil: TileBuffer::new(size, pass.stencil.as_ref()),
             },
-            gaussians: Box::default(),
+            gaussians: None,
             scratch: Scratch::default(),
             counters: Counters::default(),
         }
@@ -451,7 +452,8 @@ impl Flush<'_> {
                     tiles().for_each(|tile| self.clear(worker, clear, layer, &tile));
                 }
                 Ready::Gaussians(draw) if layer == draw.layer() => {
-                    let (buffers, fragments) = (&mut worker.buffers, &mut worker.gaussians);
+                    let buffers = &mut worker.buffers;
+                    let fragments = worker.gaussians.get_or_insert_default();
                     for tile in tiles() {
                         let counters = &mut worker.counters;
                         draw.render(&tile, buffers, fragments, counters, &self.cancel)?;
@@ -579,7 +581,7 @@ impl Flush<'_> {
 mod tests {
     use super::*;
 
-    #[test]
+    #[gaurast_runner::test]
     fn without_attachments_there_are_as_many_layers_as_a_framebuffer_may_have() {
         let rendering = |layer_count| Rendering {
             area: Rect {

@@ -253,7 +253,7 @@ impl Drop for Workers {
 mod tests {
     use super::*;
 
-    #[test]
+    #[gaurast_runner::test]
     fn impossible_macro_tiles_are_refused() {
         for macro_tile_size in [0, 8, 40, 144, u32::MAX] {
             let config = Config {
@@ -268,7 +268,7 @@ mod tests {
         }
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn threads_are_gone_when_the_pool_is() {
         let witness = Arc::new(());
         let workers = Workers::new(3).unwrap();
@@ -285,7 +285,7 @@ mod tests {
         );
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn tasks_are_shared_until_one_stops() {
         let runtime = Runtime::new(&Config {
             threads: 3,

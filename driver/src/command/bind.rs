@@ -159,7 +159,6 @@ fn bind_vertex_buffers(
             format!("there are {bindings} vertex input bindings"),
         ));
     }
-    let mut bound = simdevice::host::with_capacity(buffers.len());
     for (index, (buffer, &offset)) in buffers.optional_objects().zip(offsets).enumerate() {
         let size = sizes.get(index).copied().unwrap_or(vk::WHOLE_SIZE);
         let range = match buffer? {
@@ -169,15 +168,12 @@ fn bind_vertex_buffers(
             }
             None => nothing()?,
         };
-        bound.push(VertexBuffer {
-            range,
-            stride: strides.get(index).map(|&stride| stride as u32),
+        let stride = strides.get(index).map(|&stride| stride as u32);
+        recorder.push(Command::BindVertexBuffer {
+            binding: first + index as u32,
+            buffer: VertexBuffer { range, stride },
         });
     }
-    recorder.push(Command::BindVertexBuffers {
-        first,
-        buffers: bound,
-    });
     Ok(())
 }
 

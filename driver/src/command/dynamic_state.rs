@@ -238,7 +238,7 @@ pub(crate) fn cmd_set_viewport(
     first_viewport: u32,
     viewports: &[vk::Viewport],
 ) -> Result<(), Error> {
-    set_viewports(recorder, first_viewport, viewports, false)
+    set_viewports(recorder, first_viewport, viewports)
 }
 
 #[doc(alias = "vkCmdSetViewportWithCount")]
@@ -246,7 +246,9 @@ pub(crate) fn cmd_set_viewport_with_count(
     recorder: &mut Recorder,
     viewports: &[vk::Viewport],
 ) -> Result<(), Error> {
-    set_viewports(recorder, 0, viewports, true)
+    set_viewports(recorder, 0, viewports)?;
+    recorder.push(Command::SetViewportCount(viewports.len() as u32));
+    Ok(())
 }
 
 #[doc(alias = "vkCmdSetScissor")]
@@ -255,7 +257,7 @@ pub(crate) fn cmd_set_scissor(
     first_scissor: u32,
     scissors: &[vk::Rect2D],
 ) -> Result<(), Error> {
-    set_scissors(recorder, first_scissor, scissors, false)
+    set_scissors(recorder, first_scissor, scissors)
 }
 
 #[doc(alias = "vkCmdSetScissorWithCount")]
@@ -263,7 +265,9 @@ pub(crate) fn cmd_set_scissor_with_count(
     recorder: &mut Recorder,
     scissors: &[vk::Rect2D],
 ) -> Result<(), Error> {
-    set_scissors(recorder, 0, scissors, true)
+    set_scissors(recorder, 0, scissors)?;
+    recorder.push(Command::SetScissorCount(scissors.len() as u32));
+    Ok(())
 }
 
 /// Fails for viewports and scissors beyond those that the device supports.
@@ -283,29 +287,21 @@ fn set_viewports(
     recorder: &mut Recorder,
     first: u32,
     viewports: &[vk::Viewport],
-    with_count: bool,
 ) -> Result<(), Error> {
     require_viewports(first, viewports.len() as u32)?;
-    recorder.push(Command::SetViewports {
-        first,
-        viewports: viewports.iter().copied().map(convert::viewport).collect(),
-        with_count,
-    });
+    for (index, &viewport) in (first..).zip(viewports) {
+        let viewport = convert::viewport(viewport);
+        recorder.push(Command::SetViewport { index, viewport });
+    }
     Ok(())
 }
 
 /// Records scissors.
-fn set_scissors(
-    recorder: &mut Recorder,
-    first: u32,
-    scissors: &[vk::Rect2D],
-    with_count: bool,
-) -> Result<(), Error> {
+fn set_scissors(recorder: &mut Recorder, first: u32, scissors: &[vk::Rect2D]) -> Result<(), Error> {
     require_viewports(first, scissors.len() as u32)?;
-    recorder.push(Command::SetScissors {
-        first,
-        scissors: scissors.iter().copied().map(convert::rect).collect(),
-        with_count,
-    });
+    for (index, &scissor) in (first..).zip(scissors) {
+        let scissor = convert::rect(scissor);
+        recorder.push(Command::SetScissor { index, scissor });
+    }
     Ok(())
 }

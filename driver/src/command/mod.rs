@@ -59,33 +59,33 @@ pub(crate) enum Command {
     Packet(Packet),
     /// `vkCmdBindPipeline` at the graphics bind point.
     BindPipeline(Arc<GraphicsPipeline>),
-    /// `vkCmdBindVertexBuffers` and `vkCmdBindVertexBuffers2`.
-    BindVertexBuffers {
-        /// The first binding.
-        first: u32,
-        /// One for each binding.
-        buffers: Vec<VertexBuffer>,
+    /// `vkCmdBindVertexBuffers` and `vkCmdBindVertexBuffers2`, for each binding.
+    BindVertexBuffer {
+        /// The binding.
+        binding: u32,
+        /// The buffer.
+        buffer: VertexBuffer,
     },
     /// `vkCmdBindIndexBuffer`.
     BindIndexBuffer(IndexBuffer),
-    /// `vkCmdSetViewport` and `vkCmdSetViewportWithCount`.
-    SetViewports {
-        /// The first viewport.
-        first: u32,
-        /// One for each viewport.
-        viewports: Vec<Viewport>,
-        /// True if they are all viewports.
-        with_count: bool,
+    /// `vkCmdSetViewport` and `vkCmdSetViewportWithCount`, for each viewport.
+    SetViewport {
+        /// The viewport's number.
+        index: u32,
+        /// The viewport.
+        viewport: Viewport,
     },
-    /// `vkCmdSetScissor` and `vkCmdSetScissorWithCount`.
-    SetScissors {
-        /// The first scissor.
-        first: u32,
-        /// One for each viewport.
-        scissors: Vec<Rect>,
-        /// True if they are all scissors.
-        with_count: bool,
+    /// The count of `vkCmdSetViewportWithCount`.
+    SetViewportCount(u32),
+    /// `vkCmdSetScissor` and `vkCmdSetScissorWithCount`, for each scissor.
+    SetScissor {
+        /// The number of the scissor's viewport.
+        index: u32,
+        /// The scissor.
+        scissor: Rect,
     },
+    /// The count of `vkCmdSetScissorWithCount`.
+    SetScissorCount(u32),
     /// Any other `vkCmdSet...` of fixed-function state.
     SetDynamicState(DynamicState),
     /// `vkCmdSetGaussianCamerasGAURAST`.

@@ -1,7 +1,7 @@
 //! Compute pipelines.
 
 use super::layout::PipelineLayout;
-use super::resources::ProgramResources;
+use super::stages::ProgramResources;
 use crate::abi::error::Error;
 use crate::device::Device;
 use crate::physical_device::limits;

@@ -8,7 +8,6 @@ pub(crate) mod gaussian;
 pub(crate) mod layout;
 mod link;
 pub(crate) mod primitives;
-pub(crate) mod resources;
 pub(crate) mod stages;
 pub(crate) mod state;
 #[cfg(test)]

@@ -2,8 +2,7 @@
 
 use super::dynamic_state;
 use super::link::{self, LiveOutputs};
-use super::resources::ProgramResources;
-use super::stages;
+use super::stages::{self, ProgramResources};
 use super::state::{
     self, AttributeSource, Class, FixedFunctionState, GraphicsState, live_color_outputs,
     reads_second_source,

@@ -1,16 +1,43 @@
-//! Shader stages, translated and compared with the pipeline's layout and vertex input.
+//! Shader stages, translated and compared with the pipeline's layout and vertex input, and the resources that their
+//! programs use.
 
 use super::layout::PipelineLayout;
 use super::link;
 use super::state::{AttributeSource, VertexInputState, source};
 use crate::abi::error::Error;
 use crate::device::Device;
+use crate::device_addresses::Addresses;
 use crate::physical_device::limits;
 use crate::shader_module::ShaderStage;
 use ash::vk;
-use gaurast_spirv::{Interface, Options, ScalarType, Shader, Stage};
+use gaurast_spirv::{Interface, Options, ScalarType, Shader, ShaderBinding, Stage};
 use simdevice::Format;
 use simdevice::format::Numeric;
+use std::sync::Arc;
+
+/// The resources that a program uses.
+#[derive(Debug, Default)]
+pub(crate) struct ProgramResources {
+    /// Its descriptors.
+    pub(crate) descriptors: Vec<ShaderBinding>,
+    /// The buffers that it may access by address; None if it uses no addresses.
+    pub(crate) addresses: Option<Arc<Addresses>>,
+    /// True if it writes to memory, and therefore may write through an address.
+    pub(crate) writes: bool,
+}
+
+impl ProgramResources {
+    /// The resources that a shader uses.
+    pub(crate) fn new(device: &Device, interface: &Interface) -> Self {
+        Self {
+            descriptors: interface.descriptors.clone(),
+            addresses: interface
+                .uses_addresses
+                .then(|| Arc::clone(device.addresses())),
+            writes: interface.has_side_effects,
+        }
+    }
+}
 
 /// Translates a stage and compares it with the layout.
 pub(crate) fn translate(

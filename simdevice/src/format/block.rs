@@ -109,7 +109,7 @@ mod tests {
         rows.map(|texel| plain.decode(texel)).collect()
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn only_compressed_formats_have_blocks() {
         for &format in Format::ALL {
             let name = format!("{format:?}");
@@ -123,7 +123,7 @@ mod tests {
         }
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn colours_lie_between_two_ends() {
         // Red is first and greater, then comes blue. The codes of the first row are 0, 1, 2, 3.
         let block = [0x00, 0xF8, 0x1F, 0x00, 0b11_10_01_00, 0, 0, 0];
@@ -142,7 +142,7 @@ mod tests {
         assert_eq!(opaque[..3], clear[..3]);
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn colours_are_those_of_exact_arithmetic_but_for_a_code() {
         let mut state = 1u64;
         for _ in 0..2000 {
@@ -179,7 +179,7 @@ mod tests {
         }
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn single_components_lie_between_two_ends_exactly() {
         // The ends are 255 and 0. Codes 0 to 7 follow, with 3 bits each.
         let codes: u64 = (0..8u64).fold(0, |all, code| all | code << (3 * code));

@@ -17,7 +17,7 @@ fn simple() -> impl Iterator<Item = Format> {
     })
 }
 
-#[test]
+#[gaurast_runner::test]
 fn texels_are_whole_bytes() {
     for format in Format::ALL {
         let bits: u32 = format.components().iter().map(|c| c.bits).sum();
@@ -29,7 +29,7 @@ fn texels_are_whole_bytes() {
     assert_eq!(Format::A2B10G10R10UnormPack32.texel_size(), 4);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn every_code_survives_a_round_trip() {
     for format in simple() {
         let mut shift = 0;
@@ -65,7 +65,7 @@ fn every_code_survives_a_round_trip() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn every_24_bit_depth_is_distinct() {
     let format = Format::X8D24UnormPack32;
     for code in (0..1u32 << 24).step_by(3).chain([(1 << 24) - 1]) {
@@ -74,7 +74,7 @@ fn every_24_bit_depth_is_distinct() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn packed_formats_have_their_components_in_place() {
     let texel = [1.0, 0.0, 0.0, 0.0];
     let bits16 = |format: Format| u16::from_le_bytes(first(&format.encode(texel)));
@@ -93,7 +93,7 @@ fn packed_formats_have_their_components_in_place() {
     assert_eq!(bits32(Format::A8B8G8R8UnormPack32), 0x0000_00FF);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn unorm_rounds_to_nearest_even_and_clamps() {
     let encode = |x| Format::R8Unorm.encode([x, 0.0, 0.0, 0.0])[0];
     // 127.5 is between two codes.
@@ -109,7 +109,7 @@ fn unorm_rounds_to_nearest_even_and_clamps() {
     assert_eq!(encode(tie.next_up()), 3);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn fast_rows_agree_with_single_components() {
     let values = [
         -0.5,
@@ -150,7 +150,7 @@ fn fast_rows_agree_with_single_components() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn srgb_follows_its_definition() {
     let format = Format::R8G8B8A8Srgb;
     for code in 0..=255u8 {
@@ -182,7 +182,7 @@ fn encode_integer(format: Format, texel: [u32; 4]) -> [u8; MAX_TEXEL_SIZE] {
     format.encode(texel.map(f32::from_bits))
 }
 
-#[test]
+#[gaurast_runner::test]
 fn integers_are_sign_extended_and_clamped() {
     assert_eq!(
         decode_integer(Format::R8G8Sint, [0xFF, 0x7F]),
@@ -207,7 +207,7 @@ fn integers_are_sign_extended_and_clamped() {
     );
 }
 
-#[test]
+#[gaurast_runner::test]
 fn scaled_and_signed_normalised_components() {
     assert_eq!(
         Format::R8G8Uscaled.decode(&[200, 3]),
@@ -227,7 +227,7 @@ fn scaled_and_signed_normalised_components() {
     );
 }
 
-#[test]
+#[gaurast_runner::test]
 fn unsigned_floats_round_to_nearest() {
     let encode = |x| {
         u32::from_le_bytes(first(
@@ -244,7 +244,7 @@ fn unsigned_floats_round_to_nearest() {
     assert_eq!(encode(2f32.powi(-20)), 1, "the least denormal number");
 }
 
-#[test]
+#[gaurast_runner::test]
 fn shared_exponents() {
     let format = Format::E5B9G9R9UfloatPack32;
     for texel in [
@@ -263,7 +263,7 @@ fn shared_exponents() {
     );
 }
 
-#[test]
+#[gaurast_runner::test]
 fn planes_of_depth_and_stencil() {
     let format = Format::D24UnormS8Uint;
     assert_eq!(format.aspects(), [Aspect::Depth, Aspect::Stencil]);
@@ -277,7 +277,7 @@ fn planes_of_depth_and_stencil() {
     );
 }
 
-#[test]
+#[gaurast_runner::test]
 fn clear_values_follow_the_format() {
     let value = ClearValue::DepthStencil {
         depth: 1.0,
@@ -301,13 +301,13 @@ fn clear_values_follow_the_format() {
     );
 }
 
-#[test]
+#[gaurast_runner::test]
 fn short_texels_are_padded_with_zeros() {
     assert_eq!(Format::R8G8B8A8Unorm.decode(&[255]), [1.0, 0.0, 0.0, 0.0]);
     assert_eq!(Format::R32Sfloat.decode(&[]), [0.0, 0.0, 0.0, 1.0]);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn rows_stop_where_either_slice_does() {
     for format in simple() {
         let size = format.texel_size();

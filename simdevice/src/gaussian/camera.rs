@@ -252,7 +252,7 @@ mod tests {
     }
 
     proptest! {
-        #[test]
+        #[gaurast_runner::test]
         fn the_jacobian_is_the_derivative(x in -3.0..3.0f64, y in -3.0..3.0f64, z in 0.5..9.0f64, behind: bool) {
             for model in MODELS {
                 // Fisheyes and panoramas see to the sides and behind. A fisheye has no position for what is straight
@@ -271,7 +271,7 @@ mod tests {
         }
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn on_the_axis_a_fisheye_is_a_pinhole_and_behind_it_nothing() {
         let (place, rows) = linearize(CameraModel::Fisheye, SLOPES, [0.0, 0.0, 4.0]);
         assert_eq!(
@@ -284,7 +284,7 @@ mod tests {
         assert!(rows[0][0].is_nan());
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn a_panorama_sees_all_directions() {
         let place = |t| linearize(CameraModel::Equirectangular, SLOPES, t).0;
         let right = std::f64::consts::FRAC_PI_2;
@@ -301,7 +301,7 @@ mod tests {
         }
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn the_depth_of_what_sees_all_around_is_the_distance() {
         assert_eq!(depth(CameraModel::Fisheye, [2.0, 3.0, -6.0]), 7.0);
         assert_eq!(depth(CameraModel::Equirectangular, [2.0, 3.0, -6.0]), 7.0);

@@ -402,7 +402,7 @@ mod tests {
         }
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn pieces_make_a_cluster_of_every_gaussian() {
         for (count, expected) in [
             (700, vec![3]),
@@ -430,7 +430,7 @@ mod tests {
         }
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn pieces_are_eight_at_most() {
         for count in [AT_ONCE + 1, 1_000_000, 6_000_001] {
             assert!(count.div_ceil(piece_size(count)) <= 8, "{count}");
@@ -438,7 +438,7 @@ mod tests {
         }
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn bits_are_spread() {
         for value in 0..1 << AXIS_BITS {
             let expected: u32 = (0..AXIS_BITS)
@@ -448,7 +448,7 @@ mod tests {
         }
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn a_few_far_off_do_not_spoil_the_grid() {
         let mut positions = vec![[0.0, 0.0, 0.0]; 500];
         positions.extend(vec![[1.0, 0.0, 0.0]; 500]);

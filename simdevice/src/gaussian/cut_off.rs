@@ -136,7 +136,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        #[test]
+        #[gaurast_runner::test]
         fn a_covariance_comes_back_from_its_factor(
             xx in 0.3..400.0f64, yy in 0.3..400.0f64, correlation in -0.999..0.999f64,
         ) {

@@ -138,7 +138,7 @@ mod tests {
         CenterDepth::new(&camera, &viewport, false, format)
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn depths_are_the_projection_matrix_s() {
         // Near 1, far 4: depth (4 / 3) (1 - 1 / z).
         let of = |format| {
@@ -159,7 +159,7 @@ mod tests {
         assert_eq!(of(Format::X8D24UnormPack32).code(4.0), (1 << 24) - 1);
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn depths_from_minus_one_are_taken_to_the_unit() {
         let format = Format::D32Sfloat;
         let unit = depth(CameraModel::Orthographic, [0.0, 1.0], [0.25, 0.75], format);
@@ -179,7 +179,7 @@ mod tests {
         assert_eq!(f32::from_bits(unit.code(0.5)), 0.5);
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn the_viewport_maps_depths_and_trends_are_true() {
         let cases = [
             (

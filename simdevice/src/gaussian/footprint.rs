@@ -433,13 +433,13 @@ mod tests {
         }
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn a_small_one_reaches_its_own_tile() {
         let round = Gaussian::new([40.2, 20.7], [0.6, 0.6], 0.0, 9.0);
         assert_eq!(round.spans(), [(1, 2, 3)]);
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn one_that_is_elsewhere_reaches_nothing() {
         assert_eq!(
             Gaussian::new([-10.0, 20.0], [2.0, 2.0], 0.3, 9.0).spans(),
@@ -454,7 +454,7 @@ mod tests {
     }
 
     proptest! {
-        #[test]
+        #[gaurast_runner::test]
         fn every_tile_that_is_reached_is_listed_and_few_others(
             x in -30.0..230.0f64, y in -30.0..180.0f64,
             wide in 0.5..80.0f64, narrow in 0.5..10.0f64, angle in 0.0..3.2f64, extent in 0.1..12.0f64,

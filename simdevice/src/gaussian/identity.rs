@@ -87,7 +87,7 @@ mod tests {
     use crate::packet::BufferRange;
     use devmem::Allocation;
 
-    #[test]
+    #[gaurast_runner::test]
     fn numbers_become_vertices_and_instances_of_their_draws() {
         let memory = Allocation::new(16, true).expect("memory");
         let indices: [u32; 4] = [7, 5, 3, 1];

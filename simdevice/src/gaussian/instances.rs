@@ -170,7 +170,7 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 mod tests {
     use super::*;
 
-    #[test]
+    #[gaurast_runner::test]
     fn matrices_that_flatten_space_are_singular() {
         assert!(!is_singular([
             [1e-9, 0.0, 0.0],
@@ -184,7 +184,7 @@ mod tests {
         assert!(is_singular([[f64::NAN; 3]; 3]));
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn cofactors_are_the_inverse() {
         let a = [[1.0, 2.0, 0.5], [-1.0, 3.0, 0.25], [0.0, 4.0, -2.0]];
         let columns = cofactors(a);

@@ -125,29 +125,26 @@ pub(super) fn log2<S: Simd>(simd: S, x: S::f64s) -> S::f64s {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::runtime::SimdLevel;
+    use crate::token_of;
     use devmem::dispatch;
+    use gaurast_runner::{Case, simd_levels};
 
-    #[test]
-    fn the_logarithm_is_exact_enough_at_every_level() {
-        for (name, level) in SimdLevel::supported() {
-            let level = level.resolve().unwrap();
-            let of = |x: f64| dispatch!(level, simd => log2(simd, SimdBase::splat(simd, x)).as_slice()[0]);
-            let mut x = 1e-45f64;
-            while x < 4e38 {
-                let error = (of(x) - x.log2()).abs();
-                assert!(
-                    error <= 1e-13 * x.log2().abs().max(1.0),
-                    "{name}: {x}: {error}"
-                );
-                x *= 1.003_7;
-            }
-            assert_eq!(of(0.0), f64::NEG_INFINITY, "{name}");
-            assert_eq!(of(1.0), 0.0, "{name}");
+    #[gaurast_runner::test(each = simd_levels())]
+    fn the_logarithm_is_exact_enough(case: &Case) {
+        let level = token_of(case);
+        let of =
+            |x: f64| dispatch!(level, simd => log2(simd, SimdBase::splat(simd, x)).as_slice()[0]);
+        let mut x = 1e-45f64;
+        while x < 4e38 {
+            let error = (of(x) - x.log2()).abs();
+            assert!(error <= 1e-13 * x.log2().abs().max(1.0), "{x}: {error}");
+            x *= 1.003_7;
         }
+        assert_eq!(of(0.0), f64::NEG_INFINITY);
+        assert_eq!(of(1.0), 0.0);
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn sets_of_lanes_are_sets() {
         let mut odd = Bits::default();
         (0..GROUP).for_each(|lane| odd.set_one(lane, lane % 2 == 1));

@@ -140,7 +140,7 @@ mod tests {
         found
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn only_visible_tiles_are_reached_from_however_far() {
         for x in [-1e30, -1e19, 1e19, 1e30, f64::INFINITY, f64::NAN] {
             for half in [2.0, 1e18, 1e31, f64::INFINITY, f64::NAN] {
@@ -150,7 +150,7 @@ mod tests {
         }
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn what_straddles_the_seam_is_on_both_sides() {
         let nothing = Vec::new;
         assert_eq!(tiles(50.0, 5.0), [vec![2, 3], nothing(), nothing()]);
@@ -161,7 +161,7 @@ mod tests {
         assert_eq!(tiles(-200.0, 5.0), [nothing(), nothing(), nothing()]);
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn a_wide_one_is_cut_off_half_a_period_away() {
         let [itself, right, left] = tiles(20.0, 300.0);
         assert_eq!(itself, (0..5).collect::<Vec<u32>>());

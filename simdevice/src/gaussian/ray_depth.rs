@@ -212,7 +212,10 @@ impl PixelRays {
 mod tests {
     use super::*;
     use crate::runtime::SimdLevel;
+    use crate::token_of;
     use devmem::dispatch;
+    use fearless_simd::Level;
+    use gaurast_runner::{Case, simd_levels};
     use proptest::prelude::*;
 
     const TURNED: [f64; 9] = [0.36, 0.48, -0.8, -0.8, 0.6, 0.0, 0.48, 0.64, 0.6];
@@ -225,31 +228,30 @@ mod tests {
         }
     }
 
-    fn along(depth: &RayDepth, rays: &Rays, first: usize) -> Vec<Vec<f64>> {
-        let levels = SimdLevel::supported().into_iter();
-        let at = |level: fearless_simd::Level| dispatch!(level, simd => depth.along(simd, rays, first).as_slice().to_vec());
-        levels
-            .map(|(_, level)| at(level.resolve().unwrap()))
-            .collect()
+    /// The depths along rays. Asserts that the level gives those of the simplest.
+    fn along(level: Level, depth: &RayDepth, rays: &Rays, first: usize) -> Vec<f64> {
+        let simplest = SimdLevel::Baseline.resolve().unwrap();
+        let [found, expected] = [level, simplest].map(
+            |level| dispatch!(level, simd => depth.along(simd, rays, first).as_slice().to_vec()),
+        );
+        assert_eq!(found, expected);
+        found
     }
 
-    proptest! {
-        #[test]
-        fn the_gaussian_is_greatest_there(
+    #[gaurast_runner::test(each = simd_levels())]
+    fn the_gaussian_is_greatest_there(case: &Case) {
+        let level = token_of(case);
+        proptest!(|(
             px in -5.0..5.0f64, py in -5.0..5.0f64, pz in 1.0..9.0f64,
             w in -1.0..1.0f64, x in -1.0..1.0f64, y in -1.0..1.0f64, z in 0.1..1.0f64,
             sx in 0.1..2.0f64, sy in 0.1..2.0f64, sz in 0.1..2.0f64,
             at_x in 0.0..100.0f64, at_y in 0.0..80.0f64,
-        ) {
+        )| {
             let (offset, rotation, scale) = ([px, py, pz], [w, x, y, z], [sx, sy, sz]);
             let depth = RayDepth::new(&TURNED, rotation, scale, offset);
             for model in [CameraModel::Pinhole, CameraModel::Orthographic, CameraModel::Fisheye] {
                 let rays = pixel_rays(model).of([at_x; RAYS], [at_y; RAYS]);
-                let found = along(&depth, &rays, 8);
-                for other in &found {
-                    prop_assert_eq!(other, &found[0], "levels differ");
-                }
-                let t = found[0][3];
+                let t = along(level, &depth, &rays, 8)[3];
                 // The squared distance from the centre in standard deviations, at a point of the ray.
                 let distance = |t: f64| {
                     let parallel = model == CameraModel::Orthographic;
@@ -266,29 +268,30 @@ mod tests {
                 prop_assert!(distance(t) <= distance(t + step) + 1e-9);
                 prop_assert!(distance(t) <= distance(t - step) + 1e-9);
             }
-        }
+        });
     }
 
-    #[test]
-    fn flat_ones_meet_the_ray_and_points_are_balls() {
+    #[gaurast_runner::test(each = simd_levels())]
+    fn flat_ones_meet_the_ray_and_points_are_balls(case: &Case) {
+        let level = token_of(case);
         let upright = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
         let rays = pixel_rays(CameraModel::Pinhole).of([150.0; RAYS], [40.0; RAYS]);
         // A wall at z = 4 whose thickness is raised to a thousandth of its width, seen at 45 degrees from its middle.
         let identity = [1.0, 0.0, 0.0, 0.0];
         let wall = RayDepth::new(&upright, identity, [2.0, 2.0, 0.0], [0.0, 0.0, 4.0]);
-        let depth = along(&wall, &rays, 0)[0][0];
+        let depth = along(level, &wall, &rays, 0)[0];
         assert!((depth - 4.0).abs() < 1e-5, "{depth}");
         // The depth is that of the perpendicular's foot.
         let point = RayDepth::new(&upright, identity, [0.0; 3], [0.0, 0.0, 4.0]);
-        let depth = along(&point, &rays, 0)[0][0];
+        let depth = along(level, &point, &rays, 0)[0];
         assert!((depth - 2.0).abs() < 1e-12, "{depth}");
         // A needle parallel to the ray has the depth of its middle.
         let needle = RayDepth::new(&upright, identity, [0.0, 0.0, 3.0], [4.0, 0.0, 4.0]);
-        let depth = along(&needle, &rays, 0)[0][0];
+        let depth = along(level, &needle, &rays, 0)[0];
         assert!((depth - 4.0).abs() < 1e-5, "{depth}");
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn keys_order_as_depths_do_and_forgive_their_rounding() {
         let depths = [
             -1e30,

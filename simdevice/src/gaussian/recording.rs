@@ -145,7 +145,7 @@ mod tests {
         }
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn boxes_are_of_three_standard_deviations() {
         assert_eq!(boxed_tiles(&splat([40.0, 40.0], 1.0), BOUNDS), 1);
         assert_eq!(boxed_tiles(&splat([33.0, 40.0], 1.0), BOUNDS), 2);

@@ -198,7 +198,7 @@ impl Scratch {
 mod tests {
     use super::*;
 
-    #[test]
+    #[gaurast_runner::test]
     fn lanes_that_are_kept_are_the_same_among_others_and_alone() {
         let mut attributes = Attributes::default();
         for (lane, (x, opacity)) in (attributes.position[0].iter_mut())

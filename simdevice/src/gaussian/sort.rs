@@ -377,7 +377,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    #[test]
+    #[gaurast_runner::test]
     fn bits_order_as_numbers_do() {
         let ascending = [
             f32::NEG_INFINITY,
@@ -401,7 +401,7 @@ mod tests {
     }
 
     proptest! {
-        #[test]
+        #[gaurast_runner::test]
         fn shared_work_is_the_same(
             lengths in prop::collection::vec(0usize..4000, 1..20),
             keys in prop_oneof![Just(1u32), Just(3), Just(1 << 9), Just(1 << 20), Just(u32::MAX)],
@@ -440,7 +440,7 @@ mod tests {
             }
         }
 
-        #[test]
+        #[gaurast_runner::test]
         fn it_is_a_stable_sort(keys in prop::collection::vec(prop_oneof![any::<u32>(), 0u32..4, Just(u32::MAX)], 0..300)) {
             let mut pairs: Vec<_> = keys.iter().zip(0..).map(|(&key, at)| (key, at)).collect();
             let mut expected = pairs.clone();

@@ -230,14 +230,14 @@ mod tests {
         out
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn degree_zero_is_the_same_from_everywhere() {
         let sh = coefficients(&[(0, [1.0, 0.0, -9.0])]);
         let seen = color(0, [0.0, 0.6, 0.8], &sh).unwrap();
         assert_eq!(seen, [0.5 + C0, 0.5, 0.0], "negative sums are clamped");
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn degree_one_has_the_signs_of_3dgs() {
         let sh = coefficients(&[
             (1, [1.0, 0.0, 0.0]),
@@ -250,7 +250,7 @@ mod tests {
         assert_eq!(from([-1.0, 0.0, 0.0])[2], 0.5 + C1);
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn coefficients_that_are_not_finite_are_found_at_the_degree_drawn_only() {
         for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
             let sh = coefficients(&[(3, [0.0, bad, 0.0])]);
@@ -259,7 +259,7 @@ mod tests {
         }
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn sums_beyond_the_greatest_number_are_that() {
         const MAX: f32 = f32::MAX;
         let sh = coefficients(&[
@@ -277,7 +277,7 @@ mod tests {
         );
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn the_basis_is_orthonormal() {
         // A midpoint rule over the sphere is accurate enough to detect any wrong constant.
         let (rows, columns) = (200u32, 400u32);

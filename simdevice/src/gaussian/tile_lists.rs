@@ -535,7 +535,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        #[test]
+        #[gaurast_runner::test]
         fn lists_are_what_the_spans_say(
             // Wide enough for spans of many columns.
             columns in prop_oneof![1..8u16, 1000..2100u16],
@@ -582,7 +582,7 @@ mod tests {
         }
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn lists_keep_the_sorted_order() {
         let mut group = ProjectedGroup::default();
         for (row, spans) in [

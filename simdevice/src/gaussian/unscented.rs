@@ -201,7 +201,7 @@ mod tests {
 
     const AXES: [[f64; 3]; 3] = [[0.1, 0.0, 0.0], [0.0, 0.2, 0.0], [0.0, 0.0, 0.3]];
 
-    #[test]
+    #[gaurast_runner::test]
     fn a_linear_camera_takes_covariances_as_they_are() {
         let t = [1.0, 2.0, -5.0];
         let moments = of_points(CameraModel::Orthographic, 0.2, t, AXES).unwrap();
@@ -215,7 +215,7 @@ mod tests {
         assert!(close, "{found:?}");
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn points_that_are_not_seen_leave_it_to_the_jacobian() {
         let seen = |model, t| of_points(model, 0.2, t, AXES).is_some();
         assert!(seen(CameraModel::Pinhole, [0.0, 0.0, 0.8]));
@@ -227,7 +227,7 @@ mod tests {
         assert!(!seen(CameraModel::Equirectangular, [0.1, 1.0, 0.1]));
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn a_panorama_s_points_stay_together_at_the_seam() {
         let [ahead, behind] = [1.0, -1.0].map(|sign| {
             let t = [0.0, 0.2, 2.0 * sign];

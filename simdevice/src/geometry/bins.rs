@@ -258,7 +258,7 @@ fn tile_number(columns: u32, rows: u32, [column, row, layer]: [u32; 3]) -> u32 {
 mod tests {
     use super::*;
 
-    #[test]
+    #[gaurast_runner::test]
     fn few_pairs_far_apart_make_few_lists() {
         let area = Rect {
             x: 0,

@@ -98,7 +98,7 @@ mod tests {
         }
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn every_tile_finds_the_same_in_the_same_order() {
         let few = 100;
         for count in [few as u32 / 2, 5 * few as u32] {

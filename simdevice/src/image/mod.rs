@@ -382,7 +382,7 @@ mod tests {
         }
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn subresources_tile_the_image_without_gaps() {
         for format in [
             Format::R8G8B8A8Unorm,
@@ -414,7 +414,7 @@ mod tests {
         }
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn a_mip_chain_ends_in_single_texels() {
         let layout = desc().subresource(Aspect::Color, 2, 1).unwrap();
         assert_eq!(layout.extent, [8, 1, 1]);
@@ -422,7 +422,7 @@ mod tests {
         assert_eq!(desc().mip_extent(40), [1, 1, 1]);
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn what_an_image_lacks_has_no_layout() {
         assert_eq!(desc().subresource(Aspect::Color, 3, 0), None);
         assert_eq!(desc().subresource(Aspect::Color, 0, 2), None);
@@ -451,7 +451,7 @@ mod tests {
         );
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn an_image_must_fit_its_memory() {
         let size = desc().memory_size().unwrap();
         let memory = Allocation::new_zeroed(size).unwrap();
@@ -463,7 +463,7 @@ mod tests {
         assert!(Image::new(desc(), memory, u64::MAX).is_err());
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn rows_are_read_and_written_within_the_subresource_only() {
         let memory = Allocation::new_zeroed(desc().memory_size().unwrap()).unwrap();
         let image = Image::new(desc(), memory, 0).unwrap();
@@ -507,14 +507,14 @@ mod decompression_tests {
         out
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn blocks_are_laid_out_like_texels() {
         let image = image(false);
         let extent = |level| image.subresource(Aspect::Color, level, 0).unwrap().extent;
         assert_eq!([0, 1, 2].map(extent), [[3, 2, 1], [2, 1, 1], [1, 1, 1]]);
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn texels_are_decoded_up_to_the_edges_and_again_when_they_change() {
         for host_visible in [false, true] {
             let image = image(host_visible);
@@ -534,7 +534,7 @@ mod decompression_tests {
         }
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn images_without_compression_stay_as_they_are() {
         let desc = ImageDesc {
             format: Format::R8Unorm,

@@ -125,7 +125,7 @@ mod tests {
         height: 17,
     };
 
-    #[test]
+    #[gaurast_runner::test]
     fn tiles_are_clipped_to_the_area() {
         let tiles: Vec<_> = Tile::of_macro_tile(32, [0, 0], AREA_20X17).collect();
         let rects: Vec<_> = tiles
@@ -153,7 +153,7 @@ mod tests {
         assert_eq!(Tile::of_macro_tile(32, [1, 0], AREA_20X17).count(), 0);
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn quads_and_blocks_are_consecutive() {
         let mut seen = [false; AREA];
         for y in 0..SIDE {

@@ -254,7 +254,7 @@ impl Counters {
 mod tests {
     use super::*;
 
-    #[test]
+    #[gaurast_runner::test]
     fn a_query_reads_the_difference() {
         let mut counters = Counters::default();
         counters.add(Counter::TilePairs, 5);
@@ -267,7 +267,7 @@ mod tests {
         assert_eq!(difference.get(Counter::GaussiansDrawn), 0);
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn names_are_distinct() {
         let mut names: Vec<_> = Counter::ALL.iter().map(|c| c.info().name).collect();
         names.sort_unstable();

@@ -138,7 +138,7 @@ impl FromStr for Optimizations {
 mod tests {
     use super::*;
 
-    #[test]
+    #[gaurast_runner::test]
     fn sets_are_read_from_their_names() {
         assert_eq!("all".parse(), Ok(Optimizations::ALL));
         assert_eq!("none".parse(), Ok(Optimizations::NONE));
@@ -159,7 +159,7 @@ mod tests {
         assert_eq!("all,-blocks,-affine".parse(), Ok(most));
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn unknown_names_are_told() {
         for text in [
             "",

@@ -144,7 +144,7 @@ mod tests {
     use super::*;
     use crate::stats::counters::Counter;
 
-    #[test]
+    #[gaurast_runner::test]
     fn a_query_is_available_only_between_its_end_and_a_reset() {
         let pool = QueryPool::new(QueryKind::Performance, 2);
         let mut counters = Counters::default();

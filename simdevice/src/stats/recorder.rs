@@ -325,7 +325,7 @@ mod tests {
         height: 80,
     };
 
-    #[test]
+    #[gaurast_runner::test]
     fn boxes_touch_tiles_of_every_size() {
         let tiles = |low, high| sized_tiles(low, high, BOUNDS);
         assert_eq!(tiles([16.0, 8.0], [32.0, 16.5]), [4, 2, 1, 1]);
@@ -335,7 +335,7 @@ mod tests {
         assert_eq!(tiles([f64::NAN, 5.0], [20.0, -9.0]), [0; 4]);
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn the_sink_gets_the_trace_in_the_order_of_tiles() {
         let (send, receive) = std::sync::mpsc::channel();
         let recorder = Recorder::new(move |trace| send.send(trace).unwrap());
@@ -360,7 +360,7 @@ mod tests {
         assert_eq!(order, [[3, 0], [0, 1], [1, 1]]);
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn owners_have_frames_and_dispatches_of_their_own() {
         let recorder = Recorder::default();
         let draw = |primitives| {
@@ -386,7 +386,7 @@ mod tests {
         assert_eq!((left.len(), left[0].draws[0].primitives), (1, 20));
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn runs_grow_until_something_finishes() {
         let run = |rows, blocks| Run {
             primitives: 32,

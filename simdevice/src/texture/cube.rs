@@ -122,7 +122,7 @@ mod tests {
         from_face_axes(face, [(2 * i + 1) as f32 - n, (2 * j + 1) as f32 - n, n])
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn every_direction_meets_the_face_of_its_greatest_component() {
         let faces = [
             ([1.0, 0.2, -0.3], 0, [0.3, -0.2]),
@@ -140,7 +140,7 @@ mod tests {
         assert_eq!(Hit::new([1.0, -1.0, 0.0]).face, 3);
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn texels_across_an_edge_touch_it() {
         for size in [1, 2, 5] {
             for face in 0..6 {
@@ -166,7 +166,7 @@ mod tests {
         }
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn corners_are_shared_by_three_faces() {
         for face in 0..6 {
             let (around, count) = texels(face, [4, -1], 4);
@@ -180,7 +180,7 @@ mod tests {
         }
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn derivatives_are_those_of_the_coordinates() {
         for direction in [[1.0, 0.3, -0.2], [0.1, -2.0, 0.5], [-0.3, 0.4, 0.9]] {
             for change in [[0.1, 0.0, 0.0], [0.02, -0.1, 0.3]] {

@@ -283,7 +283,7 @@ pub(super) fn half_log2(x: f32) -> f32 {
 mod tests {
     use super::*;
 
-    #[test]
+    #[gaurast_runner::test]
     fn the_logarithm_is_exact_enough() {
         let mut x = 1e-37f32;
         while x < 1e38 {
@@ -299,7 +299,7 @@ mod tests {
         assert!(half_log2(f32::INFINITY) >= 64.0);
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn ties_go_to_the_larger_level() {
         let levels = [0.0, 0.5, 0.500_1, 1.5, 1.6, 2.0].map(nearest_level);
         assert_eq!(levels, [0, 0, 1, 1, 2, 2]);

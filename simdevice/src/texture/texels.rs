@@ -459,49 +459,48 @@ pub(super) type Floats = [f32; VECTOR_LANES];
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::runtime::SimdLevel;
+    use crate::token_of;
     use devmem::dispatch;
+    use gaurast_runner::{Case, simd_levels};
 
     /// Asserts that the texels in these words decode to the same values as by their format's decoder.
-    fn agree<T: Texels>(format: Format, words: &[u32]) {
+    fn agree<T: Texels>(case: &Case, format: Format, words: &[u32]) {
         let atomics: Vec<AtomicU32> = words.iter().copied().map(AtomicU32::new).collect();
         let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
         let size = format.texel_size();
-        for (name, level) in SimdLevel::supported() {
-            let level = level.resolve().unwrap();
-            for first in (0..bytes.len() / size).step_by(8) {
-                let found: [[f32; 8]; 4] = dispatch!(level, simd => {
-                    let index: [u32; 8] = std::array::from_fn(|lane| (first + lane) as u32);
-                    T::load(simd, &atomics, u32x8::simd_from(simd, index)).map(Into::into)
-                });
-                for lane in 0..8.min(bytes.len() / size - first) {
-                    let texel = &bytes[size * (first + lane)..][..size];
-                    let expected = format.decode(texel);
-                    for component in 0..T::COMPONENTS {
-                        let (a, b) = (found[component][lane], expected[component]);
-                        assert!(
-                            a.to_bits() == b.to_bits() || a.is_nan() && b.is_nan(),
-                            "{format:?} {name} {texel:?}: {a} {b}"
-                        );
-                    }
+        let level = token_of(case);
+        for first in (0..bytes.len() / size).step_by(8) {
+            let found: [[f32; 8]; 4] = dispatch!(level, simd => {
+                let index: [u32; 8] = std::array::from_fn(|lane| (first + lane) as u32);
+                T::load(simd, &atomics, u32x8::simd_from(simd, index)).map(Into::into)
+            });
+            for lane in 0..8.min(bytes.len() / size - first) {
+                let texel = &bytes[size * (first + lane)..][..size];
+                let expected = format.decode(texel);
+                for component in 0..T::COMPONENTS {
+                    let (a, b) = (found[component][lane], expected[component]);
+                    assert!(
+                        a.to_bits() == b.to_bits() || a.is_nan() && b.is_nan(),
+                        "{format:?} {texel:?}: {a} {b}"
+                    );
                 }
             }
         }
     }
 
-    #[test]
-    fn decoding_is_that_of_the_formats() {
+    #[gaurast_runner::test(each = simd_levels())]
+    fn decoding_is_that_of_the_formats(case: &Case) {
         let bytes: Vec<u32> = (0..256).map(|code| code * 0x0101_0101).collect();
-        agree::<Unorm8>(Format::R8Unorm, &bytes);
-        agree::<Unorm8x2>(Format::R8G8Unorm, &bytes);
-        agree::<Unorm8x4>(Format::R8G8B8A8Unorm, &bytes);
-        agree::<Srgb8x4>(Format::R8G8B8A8Srgb, &bytes);
+        agree::<Unorm8>(case, Format::R8Unorm, &bytes);
+        agree::<Unorm8x2>(case, Format::R8G8Unorm, &bytes);
+        agree::<Unorm8x4>(case, Format::R8G8B8A8Unorm, &bytes);
+        agree::<Srgb8x4>(case, Format::R8G8B8A8Srgb, &bytes);
         let halves: Vec<u32> = (0..1 << 16)
             .map(|half| half << 16 | (half ^ 0xFFFF))
             .collect();
-        agree::<Unorm16>(Format::R16Unorm, &halves);
-        agree::<Float16x4>(Format::R16G16B16A16Sfloat, &halves);
-        agree::<Float32>(Format::R32Sfloat, &halves);
-        agree::<Float32x4>(Format::R32G32B32A32Sfloat, &halves);
+        agree::<Unorm16>(case, Format::R16Unorm, &halves);
+        agree::<Float16x4>(case, Format::R16G16B16A16Sfloat, &halves);
+        agree::<Float32>(case, Format::R32Sfloat, &halves);
+        agree::<Float32x4>(case, Format::R32G32B32A32Sfloat, &halves);
     }
 }

@@ -73,7 +73,7 @@ fn texels(image: &Arc<Image>) -> Vec<u8> {
     contents(&out)
 }
 
-#[test]
+#[gaurast_runner::test]
 fn buffers_are_copied_filled_and_updated_within_their_ranges() {
     let source = buffer(&[1, 2, 3, 4, 5, 6, 7, 8]);
     let mut target = buffer(&[0; 16]);
@@ -138,14 +138,14 @@ fn buffers_are_copied_filled_and_updated_within_their_ranges() {
     );
 }
 
-#[test]
+#[gaurast_runner::test]
 fn long_fills_cover_every_word() {
     let range = buffer(&vec![0; 4 * 2500]);
     fill_buffer(&range, 0x0101_0101);
     assert_eq!(contents(&range), vec![1; 4 * 2500]);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn rows_slices_and_layers_find_their_place() {
     let image = image(ImageKind::D2, Format::R8Uint, [4, 3, 1], 2);
     let source = buffer(&(0..64).collect::<Vec<u8>>());
@@ -170,7 +170,7 @@ fn rows_slices_and_layers_find_their_place() {
     assert_eq!(texels(&image), expected.concat());
 }
 
-#[test]
+#[gaurast_runner::test]
 fn what_lies_outside_the_image_is_clipped() {
     let image = image(ImageKind::D2, Format::R8Uint, [4, 3, 1], 1);
     let source = buffer(&(0..64).collect::<Vec<u8>>());
@@ -191,7 +191,7 @@ fn what_lies_outside_the_image_is_clipped() {
     assert_eq!(texels(&image), [17, 18, 19, 20, 25, 26, 27, 28, 0, 0, 0, 0]);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn hostile_regions_do_no_harm() {
     let image = image(ImageKind::D3, Format::R8Uint, [4, 3, 2], 1);
     let range = buffer(&[7; 16]);
@@ -241,7 +241,7 @@ fn hostile_regions_do_no_harm() {
     assert!(texels(&image).iter().all(|&texel| texel == 7 || texel == 0));
 }
 
-#[test]
+#[gaurast_runner::test]
 fn layers_of_one_image_become_slices_of_another() {
     let layered = image(ImageKind::D2, Format::R8Uint, [2, 1, 1], 3);
     let solid = image(ImageKind::D3, Format::R8Unorm, [3, 2, 3], 1);
@@ -275,7 +275,7 @@ fn layers_of_one_image_become_slices_of_another() {
     assert_eq!(texels(&solid), expected.concat());
 }
 
-#[test]
+#[gaurast_runner::test]
 fn clears_write_the_aspect_that_they_name() {
     let image = image(ImageKind::D2, Format::D32SfloatS8Uint, [3, 2, 1], 2);
     let value = ClearValue::DepthStencil {
@@ -320,7 +320,7 @@ fn runtime(threads: usize) -> Runtime {
     Runtime::new(&config).unwrap()
 }
 
-#[test]
+#[gaurast_runner::test]
 fn workers_copy_what_one_thread_does() {
     // The image's rows follow one another without a gap, or do not.
     for width in [700, 704] {
@@ -369,7 +369,7 @@ fn workers_copy_rows_of(width: u32) {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn of_rows_without_a_gap_those_are_copied_that_fit_the_buffer() {
     let image = image(ImageKind::D2, Format::R32Uint, [64, 8, 1], 1);
     let words: Vec<u32> = (0..64 * 8).map(|at| at + 1).collect();
@@ -396,7 +396,7 @@ fn of_rows_without_a_gap_those_are_copied_that_fit_the_buffer() {
     assert_eq!(copied[64 * 7..], [0; 64]);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn images_without_gaps_are_copied_as_others_are() {
     for width in [60, 64] {
         let [source, target] =

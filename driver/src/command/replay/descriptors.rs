@@ -4,7 +4,7 @@ use super::state::{BoundSets, State};
 use crate::command::BoundSet;
 use crate::descriptor::layout::LayoutBinding;
 use crate::descriptor::set::Descriptor;
-use crate::pipeline::resources::ProgramResources;
+use crate::pipeline::stages::ProgramResources;
 use crate::resource::image::ImageView;
 use gaurast_spirv::{DescriptorKind, ShaderBinding};
 use simdevice::packet::Dispatch;

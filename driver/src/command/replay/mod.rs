@@ -6,7 +6,7 @@ mod gaussian;
 mod state;
 
 use self::draw::DrawError;
-use self::state::{SharedSet, State, bind};
+use self::state::{SharedSet, State, slot};
 use super::{Command, DrawIndirect, DrawParameters, HarmonicsBuffer, query};
 use crate::abi::error::Error;
 use crate::device_sync::{DeviceSync, WaitResult};
@@ -98,30 +98,24 @@ fn execute(
             state.pipeline = Some(pipeline.clone());
             state.draw_state = None;
         }
-        Command::BindVertexBuffers { first, buffers } => {
-            bind(&mut state.vertex_buffers, *first, buffers);
+        Command::BindVertexBuffer { binding, buffer } => {
+            *slot(&mut state.vertex_buffers, *binding) = Some(buffer.clone());
         }
         Command::BindIndexBuffer(buffer) => state.index_buffer = Some(buffer.clone()),
-        Command::SetViewports {
-            first,
-            viewports,
-            with_count,
-        } => {
-            bind(&mut state.viewports, *first, viewports);
-            if *with_count {
-                state.viewport_count = Some(viewports.len() as u32);
-            }
+        Command::SetViewport { index, viewport } => {
+            *slot(&mut state.viewports, *index) = Some(*viewport);
             state.draw_state = None;
         }
-        Command::SetScissors {
-            first,
-            scissors,
-            with_count,
-        } => {
-            bind(&mut state.scissors, *first, scissors);
-            if *with_count {
-                state.scissor_count = Some(scissors.len() as u32);
-            }
+        Command::SetViewportCount(count) => {
+            state.viewport_count = Some(*count);
+            state.draw_state = None;
+        }
+        Command::SetScissor { index, scissor } => {
+            *slot(&mut state.scissors, *index) = Some(*scissor);
+            state.draw_state = None;
+        }
+        Command::SetScissorCount(count) => {
+            state.scissor_count = Some(*count);
             state.draw_state = None;
         }
         Command::SetDynamicState(dynamic_state) => {

@@ -109,16 +109,13 @@ impl State {
     }
 }
 
-/// Replaces the elements of `slots` from `first` on by `values`, growing it as needed.
-pub(crate) fn bind<T: Clone>(slots: &mut Vec<Option<T>>, first: u32, values: &[T]) {
-    let first = first as usize;
-    let end = first + values.len();
-    if slots.len() < end {
-        slots.resize(end, None);
+/// The element of `slots` at `index`, which grow as needed.
+pub(crate) fn slot<T>(slots: &mut Vec<Option<T>>, index: u32) -> &mut Option<T> {
+    let index = index as usize;
+    if slots.len() <= index {
+        slots.resize_with(index + 1, || None);
     }
-    for (slot, value) in slots[first..end].iter_mut().zip(values) {
-        *slot = Some(value.clone());
-    }
+    &mut slots[index]
 }
 
 /// The sets of a bind point, by number.
@@ -128,7 +125,9 @@ pub(crate) struct BoundSets(Vec<Option<BoundSet>>);
 impl BoundSets {
     /// Binds sets from number `first` on.
     pub(crate) fn bind(&mut self, first: u32, sets: &[BoundSet]) {
-        bind(&mut self.0, first, sets);
+        for (number, set) in (first..).zip(sets) {
+            *slot(&mut self.0, number) = Some(set.clone());
+        }
     }
 
     /// Updates descriptors of the pushed set `number`. Descriptors pushed before stay, if the layout is the same.
@@ -170,11 +169,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn binding_replaces_a_range_and_leaves_the_rest() {
+    fn a_slot_is_replaced_and_the_others_stay() {
         let mut slots = Vec::new();
-        bind(&mut slots, 2, &[5, 6]);
-        bind(&mut slots, 1, &[7]);
-        bind(&mut slots, 2, &[8]);
+        for (index, value) in [(2, 5), (3, 6), (1, 7), (2, 8)] {
+            *slot(&mut slots, index) = Some(value);
+        }
         assert_eq!(slots, [None, Some(7), Some(8), Some(6)]);
     }
 }

@@ -4,8 +4,7 @@ use crate::abi::error::Error;
 use crate::device::Device;
 use crate::pipeline::layout::PipelineLayout;
 use crate::pipeline::link::{self, InterfaceComponent, LiveOutputs, Varyings};
-use crate::pipeline::resources::ProgramResources;
-use crate::pipeline::stages;
+use crate::pipeline::stages::{self, ProgramResources};
 use crate::pipeline::state::{
     AttributeSource, FixedFunctionState, GraphicsState, live_color_outputs, reads_second_source,
 };

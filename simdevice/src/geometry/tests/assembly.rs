@@ -119,7 +119,7 @@ fn expected(topology: Topology, runs: &[Vec<u32>], last: bool) -> Vec<(u32, u32,
     out
 }
 
-#[test]
+#[gaurast_runner::test]
 fn every_topology_makes_the_primitives_of_the_specification() {
     let device = device(1);
     for topology in TOPOLOGIES {
@@ -143,7 +143,7 @@ fn every_topology_makes_the_primitives_of_the_specification() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn indices_and_restarts_make_the_primitives_of_the_specification() {
     let device = device(1);
     let mut rng = ChaCha8Rng::seed_from_u64(7);
@@ -190,7 +190,7 @@ fn indices_and_restarts_make_the_primitives_of_the_specification() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn draws_of_many_chunks_are_like_one() {
     let device = device(3);
     let positions = positions(5000);
@@ -224,7 +224,7 @@ fn draws_of_many_chunks_are_like_one() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn small_instances_share_chunks() {
     let device = device(2);
     let positions = positions(6);

@@ -27,7 +27,7 @@ fn covers(primitive: &Primitive, [x, y]: [i64; 2]) -> bool {
     })
 }
 
-#[test]
+#[gaurast_runner::test]
 fn macro_tiles_have_what_touches_them_in_order() {
     let mut rng = ChaCha8Rng::seed_from_u64(51);
     let area = Rect {

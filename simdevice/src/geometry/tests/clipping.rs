@@ -77,7 +77,7 @@ fn random_position(rng: &mut ChaCha8Rng, reach: f32) -> [f32; 4] {
     [x, y, rng.random_range(-0.5..1.5) * w.abs(), w]
 }
 
-#[test]
+#[gaurast_runner::test]
 fn what_is_left_is_what_is_visible() {
     let device = device(1);
     let mut rng = ChaCha8Rng::seed_from_u64(21);
@@ -150,7 +150,7 @@ fn what_is_left_is_what_is_visible() {
     assert!(cut > 200, "{cut}");
 }
 
-#[test]
+#[gaurast_runner::test]
 fn meshes_stay_watertight_where_they_are_clipped() {
     const SIDE: usize = 24;
     let device = device(1);
@@ -220,7 +220,7 @@ fn meshes_stay_watertight_where_they_are_clipped() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn new_vertices_have_the_varyings_of_their_place() {
     let device = device(1);
     let mut rng = ChaCha8Rng::seed_from_u64(41);
@@ -274,7 +274,7 @@ fn new_vertices_have_the_varyings_of_their_place() {
     assert!(made > 500);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn far_triangles_inside_the_guard_band_are_not_cut() {
     let device = device(1);
     let positions = [
@@ -298,7 +298,7 @@ fn far_triangles_inside_the_guard_band_are_not_cut() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn lines_are_cut_by_the_depth_range() {
     let device = device(1);
     let positions = [at_pixel(10.0, 20.0, -1.0), at_pixel(110.0, 20.0, 1.0)];

@@ -7,7 +7,7 @@ use crate::stats::counters::Counter;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-#[test]
+#[gaurast_runner::test]
 fn facing_is_the_sign_of_the_area_in_the_framebuffer() {
     let device = device(1);
     // Clockwise in a framebuffer whose y points down.
@@ -62,7 +62,7 @@ fn covers(corners: [[i32; 2]; 3]) -> bool {
     })
 }
 
-#[test]
+#[gaurast_runner::test]
 fn only_what_covers_nothing_is_dropped() {
     let device = device(1);
     let mut rng = ChaCha8Rng::seed_from_u64(11);
@@ -113,7 +113,7 @@ fn only_what_covers_nothing_is_dropped() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_primitive_goes_to_the_provoking_vertexs_layer_and_viewport() {
     let device = device(1);
     let positions = [
@@ -150,7 +150,7 @@ fn a_primitive_goes_to_the_provoking_vertexs_layer_and_viewport() {
     assert_eq!(first.binned([2, 1], 3), [0; 0]);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn distances_cull_what_is_negative_everywhere() {
     let device = device(1);
     let positions = [
@@ -192,7 +192,7 @@ fn distances_cull_what_is_negative_everywhere() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn statistics_count_every_stage() {
     let device = device(1);
     let mut positions = vec![

@@ -104,7 +104,7 @@ fn random_stream(rng: &mut ChaCha8Rng, format: Format, bytes: usize) -> Attribut
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn every_format_is_decoded() {
     let mut rng = ChaCha8Rng::seed_from_u64(2);
     for &format in Format::ALL {
@@ -116,7 +116,7 @@ fn every_format_is_decoded() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn what_lies_outside_the_buffer_is_zero() {
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     for format in [
@@ -135,7 +135,7 @@ fn what_lies_outside_the_buffer_is_zero() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn built_in_inputs_are_what_vulkan_says() {
     let device = device(1);
     let mut programs = pass_through();

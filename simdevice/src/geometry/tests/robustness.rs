@@ -30,7 +30,7 @@ fn wild(rng: &mut ChaCha8Rng) -> f32 {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn wild_numbers_are_survived() {
     let device = device(1);
     let mut rng = ChaCha8Rng::seed_from_u64(61);
@@ -104,7 +104,7 @@ fn wild_numbers_are_survived() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn numbers_at_the_end_of_their_range_are_survived() {
     let device = device(1);
     let positions = [
@@ -158,7 +158,7 @@ fn numbers_at_the_end_of_their_range_are_survived() {
     assert_eq!(without(&|state| state.scissors[0].width = 0), 0);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn the_number_of_workers_changes_nothing() {
     let mut rng = ChaCha8Rng::seed_from_u64(71);
     let positions: Vec<[f32; 4]> = (0..4000)
@@ -185,7 +185,7 @@ fn the_number_of_workers_changes_nothing() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_vertex_program_without_end_is_stopped() {
     use super::super::{FrontEnd, Surface};
     use crate::{Config, Device};

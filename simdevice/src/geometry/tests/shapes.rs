@@ -12,7 +12,7 @@ fn corners(draw: &Found, number: usize) -> Vec<[i32; 2]> {
     vec![a, b, c, [a[0] + c[0] - b[0], a[1] + c[1] - b[1]]]
 }
 
-#[test]
+#[gaurast_runner::test]
 fn points_are_squares_of_their_size() {
     let device = device(1);
     let positions = [at_pixel(50.0, 40.0, 0.5); 5];
@@ -34,7 +34,7 @@ fn points_are_squares_of_their_size() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn points_are_clipped_by_their_centre() {
     let device = device(1);
     let positions = [
@@ -49,7 +49,7 @@ fn points_are_clipped_by_their_centre() {
     assert_eq!(found.primitives[0].id, 0);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn lines_are_rectangles_around_their_segment() {
     let device = device(1);
     let ends = [
@@ -94,7 +94,7 @@ fn lines_are_rectangles_around_their_segment() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_line_without_length_is_not_drawn() {
     let device = device(1);
     let positions = [at_pixel(50.0, 40.0, 0.5); 2];
@@ -102,7 +102,7 @@ fn a_line_without_length_is_not_drawn() {
     assert!(found.primitives.is_empty());
 }
 
-#[test]
+#[gaurast_runner::test]
 fn polygons_may_be_drawn_as_their_edges_or_vertices() {
     let device = device(1);
     // The near plane cuts off the third vertex. The cut is not part of the outline.
@@ -143,7 +143,7 @@ fn polygons_may_be_drawn_as_their_edges_or_vertices() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn depth_bias_follows_the_specification() {
     let device = device(1);
     // Depth falls by 0.25 over 100 pixels of x, and by 0.125 over 100 of y.

@@ -6,7 +6,7 @@ use crate::state::{Rect, Topology, Viewport};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-#[test]
+#[gaurast_runner::test]
 fn coordinates_round_to_the_nearest_sub_pixel() {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let check = |x: f32| {
@@ -27,7 +27,7 @@ fn coordinates_round_to_the_nearest_sub_pixel() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn the_viewport_maps_with_one_rounding_after_the_division() {
     let mut rng = ChaCha8Rng::seed_from_u64(9);
     for _ in 0..5000 {
@@ -53,7 +53,7 @@ fn the_viewport_maps_with_one_rounding_after_the_division() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn corners_lie_where_positions_say() {
     let device = device(1);
     let pixel = |x, y| at_pixel(x, y, 0.25);
@@ -75,7 +75,7 @@ fn corners_lie_where_positions_say() {
     assert_eq!(primitive.inverse_w, [1.0; 3]);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_viewport_has_the_pixels_whose_centres_lie_in_it() {
     let viewport = |x, width| Viewport {
         x,
@@ -101,7 +101,7 @@ fn a_viewport_has_the_pixels_whose_centres_lie_in_it() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn snapping_does_not_move_the_plane_of_depth() {
     let device = device(1);
     let mut rng = ChaCha8Rng::seed_from_u64(15);

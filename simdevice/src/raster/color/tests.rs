@@ -1,12 +1,13 @@
 use super::*;
+use crate::token_of;
 use devmem::dispatch;
-use isa::level::SimdLevel;
+use gaurast_runner::{Case, simd_levels};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 /// Tests every float near every 8-bit code and near the middle between two codes.
-#[test]
-fn bytes_are_the_nearest_and_read_back_as_their_format_says() {
+#[gaurast_runner::test(each = simd_levels())]
+fn bytes_are_the_nearest_and_read_back_as_their_format_says(case: &Case) {
     let mut values = vec![f32::NAN, f32::INFINITY, -1.0, -0.0, 2.0, f32::MIN_POSITIVE];
     for half in 0..=510 {
         let at = (f64::from(half) / 510.0) as f32;
@@ -17,25 +18,23 @@ fn bytes_are_the_nearest_and_read_back_as_their_format_says() {
         values.push(0.3);
     }
     let format = Format::R8G8B8A8Unorm;
-    for (_, level) in SimdLevel::supported() {
-        let level = level.resolve().unwrap();
-        for chunk in values.as_chunks::<16>().0 {
-            let (packed, unpacked): ([u32; 16], [f32; 16]) = dispatch!(level, simd => {
-                let value = f32x16::simd_from(simd, *chunk);
-                let packed = pack_unorm8(simd, &[value; 4], false);
-                let [.., blue, _] = unpack_unorm8(simd, packed, true);
-                (packed.into(), blue.into())
-            });
-            for (lane, value) in chunk.iter().enumerate() {
-                let bytes = packed[lane].to_le_bytes();
-                assert_eq!(bytes, format.encode([*value; 4])[..4], "{value}");
-                assert_eq!(unpacked[lane], format.decode(&bytes)[0], "{value}");
-            }
+    let level = token_of(case);
+    for chunk in values.as_chunks::<16>().0 {
+        let (packed, unpacked): ([u32; 16], [f32; 16]) = dispatch!(level, simd => {
+            let value = f32x16::simd_from(simd, *chunk);
+            let packed = pack_unorm8(simd, &[value; 4], false);
+            let [.., blue, _] = unpack_unorm8(simd, packed, true);
+            (packed.into(), blue.into())
+        });
+        for (lane, value) in chunk.iter().enumerate() {
+            let bytes = packed[lane].to_le_bytes();
+            assert_eq!(bytes, format.encode([*value; 4])[..4], "{value}");
+            assert_eq!(unpacked[lane], format.decode(&bytes)[0], "{value}");
         }
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn stores_touch_only_their_lanes() {
     let values = std::array::from_fn(|lane| 100 + lane as u32);
     let quads = QuadAddresses {
@@ -60,8 +59,9 @@ fn stores_touch_only_their_lanes() {
     assert_eq!(block.load(&words), values);
 }
 
-#[test]
-fn kernels_of_usual_equations_have_the_bits_of_the_equations() {
+#[gaurast_runner::test(each = simd_levels())]
+fn kernels_of_usual_equations_have_the_bits_of_the_equations(case: &Case) {
+    let level = token_of(case);
     let mut rng = ChaCha8Rng::seed_from_u64(19);
     for equation in [PREMULTIPLIED, STRAIGHT] {
         let state = BlendState {
@@ -76,31 +76,29 @@ fn kernels_of_usual_equations_have_the_bits_of_the_equations() {
         };
         let other = ColorOutput::new(&state, None, [0.0; 4], Format::R16G16B16A16Sfloat).unwrap();
         assert_eq!(other.codec, Codec::Other);
-        for (name, level) in SimdLevel::supported() {
-            let level = level.resolve().unwrap();
-            for _ in 0..200 {
-                let source: [[f32; 16]; 4] =
-                    std::array::from_fn(|_| std::array::from_fn(|_| rng.random_range(-0.2..1.2)));
-                let stored: [u32; 16] = rng.random();
-                let write = |output: &ColorOutput| {
-                    let mut words = stored;
-                    dispatch!(level, simd => {
-                        let [r, g, b, a] = source;
-                        let load = |lanes| f32x16::simd_from(simd, lanes);
-                        let source = [load(r), load(g), load(b), load(a)];
-                        let quads = QuadAddresses { first: [0, 4, 8, 12], consecutive: true };
-                        output.write(simd, &source, &source, 0xFBFF, &quads, &mut words);
-                    });
-                    words
-                };
-                assert_eq!(write(&kernel), write(&general), "{name} {equation:?}");
-            }
+        for _ in 0..200 {
+            let source: [[f32; 16]; 4] =
+                std::array::from_fn(|_| std::array::from_fn(|_| rng.random_range(-0.2..1.2)));
+            let stored: [u32; 16] = rng.random();
+            let write = |output: &ColorOutput| {
+                let mut words = stored;
+                dispatch!(level, simd => {
+                    let [r, g, b, a] = source;
+                    let load = |lanes| f32x16::simd_from(simd, lanes);
+                    let source = [load(r), load(g), load(b), load(a)];
+                    let quads = QuadAddresses { first: [0, 4, 8, 12], consecutive: true };
+                    output.write(simd, &source, &source, 0xFBFF, &quads, &mut words);
+                });
+                words
+            };
+            assert_eq!(write(&kernel), write(&general), "{equation:?}");
         }
     }
 }
 
-#[test]
-fn whole_blocks_of_wide_texels_are_what_their_lanes_are() {
+#[gaurast_runner::test(each = simd_levels())]
+fn whole_blocks_of_wide_texels_are_what_their_lanes_are(case: &Case) {
+    let level = token_of(case);
     let mut rng = ChaCha8Rng::seed_from_u64(20);
     for equations in [None, Some((PREMULTIPLIED, STRAIGHT))] {
         let state = BlendState {
@@ -110,32 +108,29 @@ fn whole_blocks_of_wide_texels_are_what_their_lanes_are() {
         let format = Format::R32G32B32A32Sfloat;
         let output = ColorOutput::new(&state, None, [0.0; 4], format).unwrap();
         assert_eq!(output.codec, Codec::Words);
-        for (name, level) in SimdLevel::supported() {
-            let level = level.resolve().unwrap();
-            let source: [[f32; 16]; 4] =
-                std::array::from_fn(|_| std::array::from_fn(|_| rng.random_range(-0.2..1.2)));
-            // One texel before the block and one after it must not change.
-            let stored: [u32; 72] = std::array::from_fn(|_| rng.random::<f32>().to_bits());
-            let write = |lanes: &[u16], consecutive| {
-                let mut words = stored;
-                dispatch!(level, simd => {
-                    let [r, g, b, a] = source;
-                    let load = |lanes| f32x16::simd_from(simd, lanes);
-                    let source = [load(r), load(g), load(b), load(a)];
-                    let quads = QuadAddresses { first: [1, 5, 9, 13], consecutive };
-                    for &lanes in lanes {
-                        output.write(simd, &source, &source, lanes, &quads, &mut words);
-                    }
-                });
-                words
-            };
-            let lanes: Vec<u16> = (0..16).map(|lane| 1 << lane).collect();
-            assert_eq!(
-                write(&[u16::MAX], true),
-                write(&lanes, false),
-                "{name} {equations:?}"
-            );
-            assert_ne!(write(&[u16::MAX], true), stored);
-        }
+        let source: [[f32; 16]; 4] =
+            std::array::from_fn(|_| std::array::from_fn(|_| rng.random_range(-0.2..1.2)));
+        // One texel before the block and one after it must not change.
+        let stored: [u32; 72] = std::array::from_fn(|_| rng.random::<f32>().to_bits());
+        let write = |lanes: &[u16], consecutive| {
+            let mut words = stored;
+            dispatch!(level, simd => {
+                let [r, g, b, a] = source;
+                let load = |lanes| f32x16::simd_from(simd, lanes);
+                let source = [load(r), load(g), load(b), load(a)];
+                let quads = QuadAddresses { first: [1, 5, 9, 13], consecutive };
+                for &lanes in lanes {
+                    output.write(simd, &source, &source, lanes, &quads, &mut words);
+                }
+            });
+            words
+        };
+        let lanes: Vec<u16> = (0..16).map(|lane| 1 << lane).collect();
+        assert_eq!(
+            write(&[u16::MAX], true),
+            write(&lanes, false),
+            "{equations:?}"
+        );
+        assert_ne!(write(&[u16::MAX], true), stored);
     }
 }

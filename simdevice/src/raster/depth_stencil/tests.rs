@@ -1,6 +1,8 @@
 use super::*;
+use crate::token_of;
 use devmem::dispatch;
 use fearless_simd::f32x16;
+use gaurast_runner::{Case, simd_levels};
 use isa::level::SimdLevel;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -15,8 +17,8 @@ fn expected(format: Format, depth: f32) -> u32 {
     }
 }
 
-#[test]
-fn depths_become_the_nearest_numbers_of_their_format() {
+#[gaurast_runner::test(each = simd_levels())]
+fn depths_become_the_nearest_numbers_of_their_format(case: &Case) {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let mut depths: Vec<f32> = (0..40_000)
         .map(|round| match round % 4 {
@@ -37,29 +39,27 @@ fn depths_become_the_nearest_numbers_of_their_format() {
         -1.0,
         -0.0,
     ]);
-    for (_, level) in SimdLevel::supported() {
-        let level = level.resolve().unwrap();
-        for format in [
-            Format::D16Unorm,
-            Format::X8D24UnormPack32,
-            Format::D32Sfloat,
-        ] {
-            let code = DepthEncoding::of(format);
-            for chunk in depths.as_chunks::<16>().0 {
-                let codes: [u32; 16] = dispatch!(level, simd => {
-                    code.encode(simd, f32x16::simd_from(simd, *chunk), (0.0, 1.0)).into()
-                });
-                for (depth, found) in chunk.iter().zip(codes) {
-                    let inside = if *depth > 0.0 { depth.min(1.0) } else { 0.0 };
-                    assert_eq!(found, expected(format, inside), "{format:?} {depth}");
-                    assert_eq!(found, code.encode_one(*depth), "{format:?} {depth}");
-                }
+    let level = token_of(case);
+    for format in [
+        Format::D16Unorm,
+        Format::X8D24UnormPack32,
+        Format::D32Sfloat,
+    ] {
+        let code = DepthEncoding::of(format);
+        for chunk in depths.as_chunks::<16>().0 {
+            let codes: [u32; 16] = dispatch!(level, simd => {
+                code.encode(simd, f32x16::simd_from(simd, *chunk), (0.0, 1.0)).into()
+            });
+            for (depth, found) in chunk.iter().zip(codes) {
+                let inside = if *depth > 0.0 { depth.min(1.0) } else { 0.0 };
+                assert_eq!(found, expected(format, inside), "{format:?} {depth}");
+                assert_eq!(found, code.encode_one(*depth), "{format:?} {depth}");
             }
         }
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn depth_is_clamped_to_the_viewports_range() {
     let level = SimdLevel::Best.resolve().unwrap();
     let depths = std::array::from_fn(|lane| lane as f32 / 10.0 - 0.2);

@@ -1,7 +1,8 @@
-//! The accumulators of Gaussian mode for a tile's pixels, or for one sample of each.
+//! The accumulators of Gaussian mode for a tile's pixels, or for one sample of each, and the samples' tests.
 
 use super::grid::{ALL_LANES, BLOCK_PIXELS, BLOCKS, PixelMask, TILE, block_and_lane};
 use crate::format::depth::DepthEncoding;
+use crate::limits::MAX_SAMPLES;
 use fearless_simd::{Simd, f32x16, i32x16, prelude::*};
 
 /// Accumulated colour and transmittance of a tile's pixels, or of one sample of each.
@@ -183,5 +184,30 @@ impl Accumulator {
         lanes.fold(0, |open, (lane, t)| {
             open | u32::from(t.is_sign_positive()) << lane
         })
+    }
+}
+
+pub(super) const SAMPLES: usize = MAX_SAMPLES as usize;
+
+/// A tile's samples and their tests: lanes by sample and block.
+#[derive(Debug, Default)]
+pub(super) struct Samples {
+    /// Samples that the draw may touch, and whose stored depth lies within bounds.
+    pub(super) candidates: [PixelMask; SAMPLES],
+    /// Candidates that pass the stencil test.
+    pub(super) tested: [PixelMask; SAMPLES],
+    /// The accumulator that a sample's block is composited in.
+    pub(super) accumulators: [[usize; BLOCKS]; SAMPLES],
+}
+
+impl Samples {
+    /// Leaves alone what was covered and then discarded, as if nothing had reached it.
+    pub(super) fn leave(&mut self, covered: &[PixelMask; SAMPLES], kept: &[PixelMask; SAMPLES]) {
+        let lanes = covered.iter().zip(kept);
+        for (candidates, (covered, kept)) in self.candidates.iter_mut().zip(lanes) {
+            for (block, candidates) in candidates.iter_mut().enumerate() {
+                *candidates &= !(covered[block] & !kept[block]);
+            }
+        }
     }
 }

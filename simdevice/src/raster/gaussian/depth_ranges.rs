@@ -155,7 +155,7 @@ mod tests {
         CompareOp::Always,
     ];
 
-    #[test]
+    #[gaurast_runner::test]
     fn ranges_are_the_comparisons() {
         let one = 1.0f32.to_bits();
         let depths = [0, 1, 2, 77, (1 << 16) - 1, (1 << 24) - 1, one - 1, one];
@@ -172,7 +172,7 @@ mod tests {
         }
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn what_a_tile_hides_passes_nowhere() {
         for op in OPS {
             for lanes in [[0xFFFF; BLOCKS], [0x0180; BLOCKS], [0; BLOCKS]] {

@@ -4,9 +4,9 @@
 //! Blocks of 4x4 pixels are quads in the order of lanes, so a tile is one batch of a lane each. Lanes that are not
 //! covered help with derivatives: they hold what their own pixels accumulated.
 
+use super::accumulator::{SAMPLES, Samples};
 use super::compositor::GaussianTile;
 use super::grid::{BLOCK_PIXELS, BLOCK_X, BLOCK_Y, BLOCKS, LANE_X, LANE_Y, PixelMask};
-use super::samples::{SAMPLES, Samples};
 use super::tracking::Tracked;
 use crate::gaussian::BinnedDraw;
 use crate::limits::TILE_SIZE;

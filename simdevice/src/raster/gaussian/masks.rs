@@ -72,23 +72,21 @@ impl<S: Simd> Tally<S> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::runtime::SimdLevel;
+    use crate::token_of;
     use devmem::dispatch;
+    use gaurast_runner::{Case, simd_levels};
 
-    #[test]
-    fn lanes_are_counted_at_every_level() {
-        for (name, level) in SimdLevel::supported() {
-            let level = level.resolve().unwrap();
-            let (all, without) = dispatch!(level, simd => {
-                let mask = |bits| mask32x16::from_bitmask(simd, bits);
-                let (mut all, mut without) = (Tally::new(simd), Tally::new(simd));
-                for bits in [0, 0b1011, 0xFFFF, 1 << 15] {
-                    all.add(mask(bits));
-                    without.add_without(mask(bits), mask(0b1110));
-                }
-                (all.total(), without.total())
-            });
-            assert_eq!((all, without), (20, 15), "{name}");
-        }
+    #[gaurast_runner::test(each = simd_levels())]
+    fn lanes_are_counted(case: &Case) {
+        let (all, without) = dispatch!(token_of(case), simd => {
+            let mask = |bits| mask32x16::from_bitmask(simd, bits);
+            let (mut all, mut without) = (Tally::new(simd), Tally::new(simd));
+            for bits in [0, 0b1011, 0xFFFF, 1 << 15] {
+                all.add(mask(bits));
+                without.add_without(mask(bits), mask(0b1110));
+            }
+            (all.total(), without.total())
+        });
+        assert_eq!((all, without), (20, 15));
     }
 }

@@ -18,7 +18,6 @@ mod inputs;
 mod masks;
 mod per_pixel;
 mod pixels;
-mod samples;
 mod staging;
 mod tracking;
 
@@ -36,6 +35,7 @@ use crate::raster::tile_buffer::{QuadAddresses, Target};
 use crate::runtime::Runtime;
 use crate::state::{BlendState, StencilFace, StencilOp};
 use crate::stats::counters::{Counter, Counters};
+use accumulator::{SAMPLES, Samples};
 use depth_ranges::DepthRanges;
 use devmem::dispatch;
 use fearless_simd::{Level, Simd, f32x16, prelude::*};
@@ -43,7 +43,6 @@ use fragment_stage::{FragmentStageDraw, Tools};
 use grid::{BLOCK_PIXELS, BLOCKS, PixelMask, count, lanes_within};
 use inputs::{DepthMode, FIND_MEAN, FIND_MEDIAN, NO_DEPTH, TEST_DEPTH};
 use isa::machine::Stopped;
-use samples::{SAMPLES, Samples};
 use std::sync::atomic::AtomicBool;
 
 /// A Gaussian draw made ready for tiles, which all workers share.

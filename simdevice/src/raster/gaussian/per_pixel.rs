@@ -282,7 +282,7 @@ mod tests {
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
-    #[test]
+    #[gaurast_runner::test]
     fn passes_give_everything_once_and_in_order() {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         for count in [

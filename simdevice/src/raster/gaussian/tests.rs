@@ -12,7 +12,7 @@ use crate::format::Format;
 use crate::gaussian::splat::{Splat, locate};
 use crate::gaussian::{GaussianSet, sort_and_bin};
 use crate::packet::*;
-use crate::runtime::{Config, SimdLevel};
+use crate::runtime::Config;
 use crate::simd::exp2::{
     CUBIC, EIGHTHS, POWER_OF_TWO, QUADRATIC, THIRTY_SECONDS, Table, exp2_of_negated,
 };
@@ -22,39 +22,49 @@ use crate::state::gaussian::{
 use crate::state::{Rect, Viewport};
 use crate::stats::optimizations::Optimizations;
 use crate::stats::recorder::TileWork;
+use crate::{level_of, token_of};
 use devmem::Allocation;
 use fearless_simd::f32x16;
+use gaurast_runner::{Case, simd_levels};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::sync::Arc;
 
-/// A vector's worth of one value, its power at a level, and that level's name.
+/// Powers of two at a level.
 fn exp2_at(level: Level, x: [f32; BLOCK_PIXELS]) -> [f32; BLOCK_PIXELS] {
     dispatch!(level, simd => exp2_of_negated(simd, -f32x16::simd_from(simd, x)).to_array())
 }
 
-#[test]
-fn powers_of_two_are_within_their_bound_at_every_level() {
-    for (name, level) in SimdLevel::supported() {
-        let level = level.resolve().unwrap();
-        let mut worst = 0.0f64;
-        let mut x = -126.0f32;
-        while x <= 4.0 {
-            let steps: [f32; BLOCK_PIXELS] = std::array::from_fn(|lane| x + lane as f32 / 1024.0);
-            for (x, power) in steps.into_iter().zip(exp2_at(level, steps)) {
-                let exact = f64::from(x).exp2();
-                let ulp = f64::from((exact as f32).next_up()) - f64::from(exact as f32);
-                worst = worst.max((f64::from(power) - exact).abs() / ulp);
-            }
-            x += 16.0 / 1024.0;
+#[gaurast_runner::test(each = simd_levels())]
+fn powers_of_two_are_within_their_bound(case: &Case) {
+    let level = token_of(case);
+    let mut worst = 0.0f64;
+    let mut x = -126.0f32;
+    while x <= 4.0 {
+        let steps: [f32; BLOCK_PIXELS] = std::array::from_fn(|lane| x + lane as f32 / 1024.0);
+        for (x, power) in steps.into_iter().zip(exp2_at(level, steps)) {
+            let exact = f64::from(x).exp2();
+            let ulp = f64::from((exact as f32).next_up()) - f64::from(exact as f32);
+            worst = worst.max((f64::from(power) - exact).abs() / ulp);
         }
-        let bound = match devmem::places(level) {
-            Some(32) => 1.95,
-            Some(_) => 1.35,
-            None => 2.1,
-        };
-        assert!(worst <= bound, "{name}: {worst} ulp");
+        x += 16.0 / 1024.0;
     }
+    let bound = match devmem::places(level) {
+        Some(32) => 1.95,
+        Some(_) => 1.35,
+        None => 2.1,
+    };
+    assert!(worst <= bound, "{worst} ulp");
+}
+
+/// A device of a test's variant.
+fn device_of(case: &Case) -> Device {
+    Device::new(&Config {
+        threads: 2,
+        simd: level_of(case),
+        ..Config::default()
+    })
+    .unwrap()
 }
 
 /// A scene of `count` Gaussians before a camera at the origin, from dust to ones that fill the screen.
@@ -298,55 +308,49 @@ fn naive_sample(
     out
 }
 
-/// Every pixel of every tile equals the naive twin's, bit for bit, at every level.
-fn check(seed: u64, count: u32, state: &GaussianState, bounds: Rect) {
-    check_changed(seed, count, state, bounds, |_| {});
+/// Every pixel of every tile equals the naive twin's, bit for bit.
+fn check(case: &Case, seed: u64, count: u32, state: &GaussianState, bounds: Rect) {
+    check_changed(case, seed, count, state, bounds, |_| {});
 }
 
 /// The same of a draw that is changed before it is rendered.
 fn check_changed(
+    case: &Case,
     seed: u64,
     count: u32,
     state: &GaussianState,
     bounds: Rect,
     change: impl Fn(&mut BinnedDraw),
 ) {
-    for (name, simd) in SimdLevel::supported() {
-        let device = Device::new(&Config {
-            threads: 2,
-            simd,
-            ..Config::default()
-        })
-        .unwrap();
-        let mut draw = draw(seed, count, state.clone(), &device, bounds);
-        change(&mut draw);
-        let mut tile = Box::new(GaussianTile::default());
-        let mut covered = 0;
-        for at in (0..4).flat_map(|y| (0..6).map(move |x| [x, y])) {
-            let any = tile.render(
-                &draw,
-                device.level(),
-                at[0],
-                at[1],
-                &mut Counters::default(),
-            );
-            for (x, y) in (0..TILE).flat_map(|y| (0..TILE).map(move |x| (x, y))) {
-                let pixel = [at[0] as usize * TILE + x, at[1] as usize * TILE + y];
-                let inside = Rect {
-                    x: pixel[0] as i32,
-                    y: pixel[1] as i32,
-                    width: 1,
-                    height: 1,
-                };
-                let inside = !inside.intersect(bounds).is_empty();
-                let expected = naive_pixel(&draw, at, x, y, device.level()).filter(|_| inside);
-                let got = tile.pixel(x, y).filter(|_| any);
-                assert_eq!(got, expected, "{name}, seed {seed}, pixel {pixel:?}");
-                covered += u32::from(got.is_some());
-            }
+    let device = device_of(case);
+    let mut draw = draw(seed, count, state.clone(), &device, bounds);
+    change(&mut draw);
+    let mut tile = Box::new(GaussianTile::default());
+    let mut covered = 0;
+    for at in (0..4).flat_map(|y| (0..6).map(move |x| [x, y])) {
+        let any = tile.render(
+            &draw,
+            device.level(),
+            at[0],
+            at[1],
+            &mut Counters::default(),
+        );
+        for (x, y) in (0..TILE).flat_map(|y| (0..TILE).map(move |x| (x, y))) {
+            let pixel = [at[0] as usize * TILE + x, at[1] as usize * TILE + y];
+            let inside = Rect {
+                x: pixel[0] as i32,
+                y: pixel[1] as i32,
+                width: 1,
+                height: 1,
+            };
+            let inside = !inside.intersect(bounds).is_empty();
+            let expected = naive_pixel(&draw, at, x, y, device.level()).filter(|_| inside);
+            let got = tile.pixel(x, y).filter(|_| any);
+            assert_eq!(got, expected, "seed {seed}, pixel {pixel:?}");
+            covered += u32::from(got.is_some());
         }
-        assert!(covered > 0, "{name}, seed {seed}: nothing was drawn");
     }
+    assert!(covered > 0, "seed {seed}: nothing was drawn");
 }
 
 const WHOLE: Rect = Rect {
@@ -356,15 +360,15 @@ const WHOLE: Rect = Rect {
     height: 64,
 };
 
-#[test]
-fn the_kernel_equals_its_naive_twin() {
+#[gaurast_runner::test(each = simd_levels())]
+fn the_kernel_equals_its_naive_twin(case: &Case) {
     for seed in 0..4 {
-        check(seed, 400, &defaults(), WHOLE);
+        check(case, seed, 400, &defaults(), WHOLE);
     }
 }
 
-#[test]
-fn it_does_so_where_nothing_ends_early_and_nothing_is_too_faint() {
+#[gaurast_runner::test(each = simd_levels())]
+fn it_does_so_where_nothing_ends_early_and_nothing_is_too_faint(case: &Case) {
     let state = GaussianState {
         alpha_floor: 0.0,
         alpha_ceiling: 1.0,
@@ -373,6 +377,7 @@ fn it_does_so_where_nothing_ends_early_and_nothing_is_too_faint() {
         ..defaults()
     };
     check(
+        case,
         10,
         150,
         &state,
@@ -385,9 +390,9 @@ fn it_does_so_where_nothing_ends_early_and_nothing_is_too_faint() {
     );
 }
 
-#[test]
-fn it_does_so_where_gaussians_are_wider_than_a_period() {
-    check_changed(6, 400, &defaults(), WHOLE, |draw| {
+#[gaurast_runner::test(each = simd_levels())]
+fn it_does_so_where_gaussians_are_wider_than_a_period(case: &Case) {
+    check_changed(case, 6, 400, &defaults(), WHOLE, |draw| {
         draw.half_period = 2.25;
         let sorted = Arc::get_mut(&mut draw.sorted).unwrap();
         for splat in sorted.splats.iter_mut().flatten().step_by(3) {
@@ -396,8 +401,8 @@ fn it_does_so_where_gaussians_are_wider_than_a_period() {
     });
 }
 
-#[test]
-fn it_does_so_where_gaussians_are_steep() {
+#[gaurast_runner::test(each = simd_levels())]
+fn it_does_so_where_gaussians_are_steep(case: &Case) {
     // Without a filter dust is thinner than a pixel by far.
     let state = GaussianState {
         low_pass_variance: 0.0,
@@ -412,17 +417,18 @@ fn it_does_so_where_gaussians_are_steep() {
         .flatten()
         .filter(|splat| splat.needs_f64);
     assert!(steep.count() > 10);
-    check(5, 3000, &state, WHOLE);
+    check(case, 5, 3000, &state, WHOLE);
 }
 
-#[test]
-fn it_does_so_where_pixels_end_at_once() {
+#[gaurast_runner::test(each = simd_levels())]
+fn it_does_so_where_pixels_end_at_once(case: &Case) {
     let state = GaussianState {
         transmittance_floor: 0.5,
         opacity_compensated: true,
         ..defaults()
     };
     check(
+        case,
         20,
         400,
         &state,
@@ -435,14 +441,14 @@ fn it_does_so_where_pixels_end_at_once() {
     );
 }
 
-#[test]
-fn it_does_so_where_opacities_are_about_the_ceiling() {
+#[gaurast_runner::test(each = simd_levels())]
+fn it_does_so_where_opacities_are_about_the_ceiling(case: &Case) {
     let state = GaussianState {
         alpha_ceiling: 0.9,
         ..defaults()
     };
     for above in [-3e-4, -1.01e-4, -0.99e-4, 0.0, 1e-6, 1e-3] {
-        check_changed(7, 300, &state, WHOLE, |draw| {
+        check_changed(case, 7, 300, &state, WHOLE, |draw| {
             let sorted = Arc::get_mut(&mut draw.sorted).unwrap();
             for splat in sorted.splats.iter_mut().flatten() {
                 splat.log2_opacity = (0.9f64.log2() + above) as f32;
@@ -453,7 +459,7 @@ fn it_does_so_where_opacities_are_about_the_ceiling() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_saturated_tile_fetches_no_more() {
     let device = Device::new(&Config::default()).unwrap();
     let mut tile = Box::new(GaussianTile::default());
@@ -473,7 +479,7 @@ fn a_saturated_tile_fetches_no_more() {
     assert_eq!(all, list);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn recording_work_changes_no_bit_and_agrees_with_the_counters() {
     use crate::stats::recorder::{DrawWork, Recorder};
     let quiet = Device::new(&Config::default()).unwrap();

@@ -263,7 +263,7 @@ mod tests {
         }
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn every_equation_agrees_with_the_specification() {
         compare(Format::R32G32B32A32Sfloat, None);
         compare(Format::R8G8B8A8Unorm, Some((0.0, 1.0)));
@@ -271,7 +271,7 @@ mod tests {
         compare(Format::R8G8B8A8Snorm, Some((-1.0, 1.0)));
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn masked_components_and_zero_factors_keep_nothing_they_should_not() {
         let replace = BlendEquation {
             source: BlendFactor::One,

@@ -2,8 +2,9 @@ use super::*;
 use crate::format::Aspect;
 use crate::image::{Image, ImageDesc, ImageKind, ImageView};
 use crate::packet::StoreOp;
+use crate::token_of;
 use devmem::Allocation;
-use isa::level::SimdLevel;
+use gaurast_runner::{Case, simd_levels};
 use std::sync::Arc;
 
 fn view(format: Format, extent: [u32; 3], kind: ImageKind, samples: u32) -> ImageView {
@@ -42,7 +43,7 @@ fn pixel(x: i32, y: i32) -> Rect {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn untouched_tiles_keep_their_bytes_and_touched_ones_are_stored() {
     let view = view(Format::R8G8B8A8Unorm, [20, 17, 1], ImageKind::D2, 1);
     let memory = view.image.memory.clone();
@@ -68,7 +69,7 @@ fn untouched_tiles_keep_their_bytes_and_touched_ones_are_stored() {
     );
 }
 
-#[test]
+#[gaurast_runner::test]
 fn texels_of_every_size_survive_a_load_and_a_store() {
     for &format in Format::ALL {
         for &aspect in format.aspects() {
@@ -99,7 +100,7 @@ fn texels_of_every_size_survive_a_load_and_a_store() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn depth_and_stencil_keep_their_precision() {
     let view = view(Format::D24UnormS8Uint, [16, 16, 1], ImageKind::D2, 1);
     let mut depth = Target::new(&view, Aspect::Depth, 1, StoreOp::Store).unwrap();
@@ -130,7 +131,7 @@ fn depth_and_stencil_keep_their_precision() {
     assert_eq!(stencils.bytes_mut()[5..8], [3, 200, 3]);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn what_cannot_be_rendered_to_is_refused() {
     let color = view(Format::R8Unorm, [4, 4, 1], ImageKind::D2, 1);
     let new = |view: &ImageView, aspect| Target::new(view, aspect, 1, StoreOp::Store).err();
@@ -162,8 +163,8 @@ fn what_cannot_be_rendered_to_is_refused() {
 }
 
 /// Tests the kernel for the mean of four samples of bytes against the general way.
-#[test]
-fn means_of_bytes_are_those_of_the_format() {
+#[gaurast_runner::test(each = simd_levels())]
+fn means_of_bytes_are_those_of_the_format(case: &Case) {
     let format = Format::R8G8B8A8Unorm;
     let image = view(format, [20, 17, 1], ImageKind::D2, 4);
     let memory = image.image.memory.clone();
@@ -174,29 +175,27 @@ fn means_of_bytes_are_those_of_the_format() {
     let target = Target::new(&image, Aspect::Color, 1, StoreOp::Store).unwrap();
     let resolved = view(format, [20, 17, 1], ImageKind::D2, 1);
     let resolve = Target::new(&resolved, Aspect::Color, 1, StoreOp::Store).unwrap();
-    for (name, level) in SimdLevel::supported() {
-        let level = level.resolve().unwrap();
-        let mut plane = TileBuffer::new(32, Some(&target));
-        for tile in Tile::of_macro_tile(32, [0, 0], AREA_20X17) {
-            plane.load_or_clear(&target, 0, &tile);
-            plane.resolve(level, &target, (&resolve, ResolveMode::Average), 0, &tile);
-        }
-        for y in 0..17 {
-            for x in 3..20 {
-                let mut samples = [[0; 4]; 4];
-                for (sample, bytes) in samples.iter_mut().enumerate() {
-                    let rows = target.sample(0, sample as u32).unwrap();
-                    rows.read([x, y], bytes);
-                }
-                let decoded = samples.map(|bytes| [format.decode(&bytes)]);
-                let mut mean = [[0.0; 4]];
-                let rows = decoded.iter().map(|texel| &texel[..]);
-                resolve_row(format, ResolveMode::Average, rows, &mut mean);
-                let mut found = [0; 4];
-                let rows = resolve.sample(0, 0).unwrap();
-                rows.read([x, y], &mut found);
-                assert_eq!(found, format.encode(mean[0])[..4], "{name} {x} {y}");
+    let level = token_of(case);
+    let mut plane = TileBuffer::new(32, Some(&target));
+    for tile in Tile::of_macro_tile(32, [0, 0], AREA_20X17) {
+        plane.load_or_clear(&target, 0, &tile);
+        plane.resolve(level, &target, (&resolve, ResolveMode::Average), 0, &tile);
+    }
+    for y in 0..17 {
+        for x in 3..20 {
+            let mut samples = [[0; 4]; 4];
+            for (sample, bytes) in samples.iter_mut().enumerate() {
+                let rows = target.sample(0, sample as u32).unwrap();
+                rows.read([x, y], bytes);
             }
+            let decoded = samples.map(|bytes| [format.decode(&bytes)]);
+            let mut mean = [[0.0; 4]];
+            let rows = decoded.iter().map(|texel| &texel[..]);
+            resolve_row(format, ResolveMode::Average, rows, &mut mean);
+            let mut found = [0; 4];
+            let rows = resolve.sample(0, 0).unwrap();
+            rows.read([x, y], &mut found);
+            assert_eq!(found, format.encode(mean[0])[..4], "{x} {y}");
         }
     }
 }

@@ -161,7 +161,7 @@ mod tests {
 
     use super::*;
 
-    #[test]
+    #[gaurast_runner::test]
     fn quads_and_blocks_are_counted_once() {
         let mut work = MacroTileWork::default();
         work.list(3, 5);

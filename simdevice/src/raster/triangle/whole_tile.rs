@@ -181,7 +181,7 @@ impl DeferredTiles {
 mod tests {
     use super::*;
 
-    #[test]
+    #[gaurast_runner::test]
     fn the_last_primitive_is_what_a_tile_waits_for() {
         let mut deferred = DeferredTiles::default();
         let setup = TriangleSetup::default();

@@ -1,7 +1,8 @@
-//! Tests that filtering 16 lanes at once and lane by lane gives the same bits, at every SIMD level and for random
-//! requests.
+//! Tests that filtering 16 lanes at once and lane by lane gives the same bits, for random requests.
 
 use super::*;
+use crate::token_of;
+use gaurast_runner::{Case, simd_levels};
 use rand::seq::IndexedRandom;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -73,30 +74,28 @@ fn random_sampler(rng: &mut ChaCha8Rng) -> Sampler {
     }
 }
 
-fn assert_agree(image: &SampledImage, sampler: Sampler, request: &SampleRequest) {
-    for (name, level) in SimdLevel::supported() {
-        let level = level.resolve().unwrap();
-        let binding = ImageBinding::Sampled(image.clone());
-        let table = ImageTable::new(level, [binding], [Some(sampler)]);
-        let batched = table.sample(0, 0, request);
-        let one_by_one = table.lane_by_lane().sample(0, 0, request);
-        for lane in (0..16).filter(|lane| request.mask >> lane & 1 != 0) {
-            let (a, b) = (floats(&batched, lane), floats(&one_by_one, lane));
-            let same = a
-                .iter()
-                .zip(b)
-                .all(|(a, b)| a.to_bits() == b.to_bits() || a.is_nan() && b.is_nan());
-            assert!(
-                same,
-                "{name} lane {lane}: {a:?}, {b:?}\n{:?}\n{sampler:?}\n{request:?}",
-                image.view.image.desc
-            );
-        }
+fn assert_agree(case: &Case, image: &SampledImage, sampler: Sampler, request: &SampleRequest) {
+    let level = token_of(case);
+    let binding = ImageBinding::Sampled(image.clone());
+    let table = ImageTable::new(level, [binding], [Some(sampler)]);
+    let batched = table.sample(0, 0, request);
+    let one_by_one = table.lane_by_lane().sample(0, 0, request);
+    for lane in (0..16).filter(|lane| request.mask >> lane & 1 != 0) {
+        let (a, b) = (floats(&batched, lane), floats(&one_by_one, lane));
+        let same = a
+            .iter()
+            .zip(b)
+            .all(|(a, b)| a.to_bits() == b.to_bits() || a.is_nan() && b.is_nan());
+        assert!(
+            same,
+            "lane {lane}: {a:?}, {b:?}\n{:?}\n{sampler:?}\n{request:?}",
+            image.view.image.desc
+        );
     }
 }
 
-#[test]
-fn at_once_or_one_by_one_is_the_same() {
+#[gaurast_runner::test(each = simd_levels())]
+fn at_once_or_one_by_one_is_the_same(case: &Case) {
     let mut rng = ChaCha8Rng::seed_from_u64(7);
     let formats = [
         Format::R8Unorm,
@@ -182,7 +181,7 @@ fn at_once_or_one_by_one_is_the_same() {
             sampler.compare_op = Some(*ops.choose(&mut rng).unwrap());
             request.compare = Some(lanes(|| coordinate(&mut rng).to_bits()));
         }
-        assert_agree(&image, sampler, &request);
+        assert_agree(case, &image, sampler, &request);
     }
 }
 
@@ -207,8 +206,8 @@ fn surface_coordinates(rng: &mut ChaCha8Rng) -> Vec<[f32; 4]> {
     at
 }
 
-#[test]
-fn plain_samples_are_the_same_one_by_one() {
+#[gaurast_runner::test(each = simd_levels())]
+fn plain_samples_are_the_same_one_by_one(case: &Case) {
     let mut rng = ChaCha8Rng::seed_from_u64(8);
     let formats = [
         Format::R8G8B8A8Unorm,
@@ -254,12 +253,12 @@ fn plain_samples_are_the_same_one_by_one() {
         if round % 10 == 0 {
             request.offset[round / 10 % 2] = [2; 16];
         }
-        assert_agree(&image, sampler, &request);
+        assert_agree(case, &image, sampler, &request);
     }
 }
 
-#[test]
-fn a_level_of_weight_zero_is_not_read() {
+#[gaurast_runner::test(each = simd_levels())]
+fn a_level_of_weight_zero_is_not_read(case: &Case) {
     let desc = ImageDesc {
         mip_levels: 2,
         ..desc(ImageKind::D2, Format::R32Sfloat, [4, 4, 1])
@@ -273,7 +272,7 @@ fn a_level_of_weight_zero_is_not_read() {
     };
     let mut request = request(Dimension::D2, &[[0.3, 0.3, 0.0, 0.0]]);
     request.lod = LodRequest::Explicit(std::array::from_fn(|lane| (lane as f32 % 2.0).to_bits()));
-    assert_agree(&image, sampler, &request);
+    assert_agree(case, &image, sampler, &request);
     let answer = table(image, sampler).sample(0, 0, &request);
     assert_eq!(floats(&answer, 0)[0], 0.5);
     assert_eq!(floats(&answer, 1)[0], f32::INFINITY);

@@ -2,7 +2,7 @@
 
 use super::*;
 
-#[test]
+#[gaurast_runner::test]
 fn the_level_of_detail_chooses_levels_and_filters() {
     let desc = ImageDesc {
         mip_levels: 4,
@@ -73,7 +73,7 @@ fn the_level_of_detail_chooses_levels_and_filters() {
     assert_eq!(floats(&answer, 1)[0], 3.5, "minified");
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_gather_begins_lower_left_and_goes_round() {
     let image = image(
         desc(ImageKind::D2, Format::R8G8B8A8Uint, [4, 4, 1]),
@@ -92,7 +92,7 @@ fn a_gather_begins_lower_left_and_goes_round() {
     assert_eq!(one(table.sample(0, 0, &request)), [12, 13, 3, 2]);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn comparisons_come_before_the_filter() {
     let depths = |x: u32| if x == 0 { 0.25 } else { 0.75 };
     for format in [
@@ -124,7 +124,7 @@ fn comparisons_come_before_the_filter() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_reference_is_clamped_for_unsigned_normalized_depth_only() {
     for (format, expected) in [(Format::D16Unorm, 1.0), (Format::D32Sfloat, 0.0)] {
         let image = image(desc(ImageKind::D2, format, [1, 1, 1]), |_, _, _| [1.0; 4]);
@@ -139,7 +139,7 @@ fn a_reference_is_clamped_for_unsigned_normalized_depth_only() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn borders_have_the_components_of_the_format() {
     let cases = [
         (Format::R8G8B8A8Unorm, [0.25, 0.5, 0.75, 0.125]),
@@ -165,7 +165,7 @@ fn borders_have_the_components_of_the_format() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn layers_are_rounded_to_even_and_clamped() {
     let desc = ImageDesc {
         array_layers: 4,
@@ -213,7 +213,7 @@ fn smooth_cube(size: u32) -> SampledImage {
     })
 }
 
-#[test]
+#[gaurast_runner::test]
 fn cubes_are_smooth_across_edges_and_corners() {
     let table = table(smooth_cube(16), filtered(Filter::Linear));
     let mut at = Vec::new();
@@ -239,7 +239,7 @@ fn cubes_are_smooth_across_edges_and_corners() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_constant_cube_is_constant_everywhere() {
     let desc = ImageDesc {
         array_layers: 6,
@@ -264,7 +264,7 @@ fn a_constant_cube_is_constant_everywhere() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn srgb_is_decoded_before_it_is_filtered() {
     let image = image(
         desc(ImageKind::D2, Format::R8G8B8A8Srgb, [2, 1, 1]),
@@ -278,7 +278,7 @@ fn srgb_is_decoded_before_it_is_filtered() {
     assert_eq!(floats(&answer, 0), [0.5; 4]);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn integers_are_never_mixed() {
     let image = image(
         desc(ImageKind::D2, Format::R8G8B8A8Sint, [2, 2, 1]),
@@ -290,7 +290,7 @@ fn integers_are_never_mixed() {
     assert_eq!(found, [-2, 1, -128, 127]);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn unnormalized_coordinates_count_texels() {
     let image = image(
         desc(ImageKind::D2, Format::R32Sfloat, [5, 3, 1]),
@@ -314,7 +314,7 @@ fn unnormalized_coordinates_count_texels() {
     );
 }
 
-#[test]
+#[gaurast_runner::test]
 fn what_is_not_bound_reads_zero() {
     let level = SimdLevel::Best.resolve().unwrap();
     let table = ImageTable::new(

@@ -23,7 +23,7 @@ fn walk(mode: AddressMode, i: i32, size: i32) -> Option<u32> {
     Some(at as u32)
 }
 
-#[test]
+#[gaurast_runner::test]
 fn indices_wrap_as_specified() {
     for mode in MODES {
         for size in 1..9 {
@@ -46,7 +46,7 @@ fn linear(mode: AddressMode, s: f64, size: i32, offset: i32) -> ([Option<u32>; 2
     (indices, u - u.floor())
 }
 
-#[test]
+#[gaurast_runner::test]
 fn filters_are_weighted_means() {
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     let border = 0.625;
@@ -104,7 +104,7 @@ fn filters_are_weighted_means() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn nearest_texels_are_those_that_hold_the_point() {
     for mode in MODES {
         let image = image(
@@ -128,7 +128,7 @@ fn nearest_texels_are_those_that_hold_the_point() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn levels_of_detail_follow_the_footprint() {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let desc = ImageDesc {

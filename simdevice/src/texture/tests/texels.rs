@@ -28,7 +28,7 @@ const ARRAY: ImageShape = ImageShape {
     multisampled: false,
 };
 
-#[test]
+#[gaurast_runner::test]
 fn fetches_reach_levels_layers_and_samples_within_bounds() {
     let desc = ImageDesc {
         mip_levels: 2,
@@ -62,7 +62,7 @@ fn fetches_reach_levels_layers_and_samples_within_bounds() {
     assert_eq!(found[2..], [[0, 0, 0, 1]; 5], "outside");
 }
 
-#[test]
+#[gaurast_runner::test]
 fn samples_are_told_apart() {
     let desc = ImageDesc {
         samples: 4,
@@ -85,7 +85,7 @@ fn samples_are_told_apart() {
     assert_eq!(table.samples(0), 4);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn what_is_written_is_read_back() {
     let floats = [0.5f32, -1.0, 0.25, 1.0].map(f32::to_bits);
     let cases = [
@@ -126,7 +126,7 @@ fn what_is_written_is_read_back() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn writes_outside_vanish() {
     let image = image(
         desc(ImageKind::D2, Format::R32Uint, [3, 3, 1]),
@@ -146,7 +146,7 @@ fn writes_outside_vanish() {
     assert!((0..memory.len() / 4).all(|word| memory.load_u32(4 * word) == Some(0)));
 }
 
-#[test]
+#[gaurast_runner::test]
 fn sampled_images_are_not_written() {
     let image = image(
         desc(ImageKind::D2, Format::R32Uint, [3, 3, 1]),
@@ -159,7 +159,7 @@ fn sampled_images_are_not_written() {
     assert_eq!(table.read(0, &request)[0][0], 0);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn atomics_act_in_order_of_lanes() {
     let image = image(
         desc(ImageKind::D2, Format::R32Uint, [2, 2, 1]),
@@ -174,7 +174,7 @@ fn atomics_act_in_order_of_lanes() {
     assert_eq!(table.read(0, &request)[0][0], 1);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn texel_buffers_end_where_their_range_does() {
     let memory = Allocation::new_zeroed(64).unwrap();
     let level = SimdLevel::Best.resolve().unwrap();
@@ -204,7 +204,7 @@ fn texel_buffers_end_where_their_range_does() {
     assert_eq!(outside.read(0, &request), [[0; 16]; 4]);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn queries_tell_what_is_there() {
     let desc = ImageDesc {
         mip_levels: 3,
@@ -226,7 +226,7 @@ fn queries_tell_what_is_there() {
     assert_eq!(table.size(1, ARRAY, 0), [0; 4]);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn stencil_and_depth_are_planes_of_their_own() {
     let desc = desc(ImageKind::D2, Format::D32SfloatS8Uint, [2, 2, 1]);
     let depth = image(desc, |_, _, _| [0.5, 0.0, 0.0, 0.0]);

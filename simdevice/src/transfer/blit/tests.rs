@@ -106,7 +106,7 @@ fn corners() -> impl Strategy<Value = [i32; 2]> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
 
-    #[test]
+    #[gaurast_runner::test]
     fn linear_blits_are_weighted_means(
         seed: u32,
         from in [corners(), corners(), corners()],
@@ -144,7 +144,7 @@ proptest! {
         }
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn nearest_blits_take_the_texel_that_the_centre_lies_in(
         seed: u32,
         from in [corners(), corners()],
@@ -187,7 +187,7 @@ proptest! {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_centre_on_an_edge_between_texels_lies_in_the_second() {
     // The width is halved: the centres are at 1, 3 and 5 of six texels.
     let source = image(ImageKind::D1, Format::R8Uint, [6, 1, 1], 1);
@@ -220,7 +220,7 @@ fn a_centre_on_an_edge_between_texels_lies_in_the_second() {
     assert_eq!(read(), [15, 13, 11], "an empty box");
 }
 
-#[test]
+#[gaurast_runner::test]
 fn depth_and_stencil_keep_their_bits() {
     let make = || image(ImageKind::D2, Format::D24UnormS8Uint, [5, 4, 1], 1);
     let (source, target) = (make(), make());
@@ -245,7 +245,7 @@ fn depth_and_stencil_keep_their_bits() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn components_are_converted_clamped_and_filled_in() {
     let convert = |from: Format, texel: [f32; 4], to: Format| {
         let source = image(ImageKind::D2, from, [1, 1, 1], 1);
@@ -291,7 +291,7 @@ fn components_are_converted_clamped_and_filled_in() {
     );
 }
 
-#[test]
+#[gaurast_runner::test]
 fn hostile_regions_touch_nothing_else() {
     let source = image(ImageKind::D2, Format::R8Unorm, [4, 4, 1], 1);
     let target = image(ImageKind::D2, Format::R8Unorm, [4, 4, 1], 1);

@@ -13,7 +13,7 @@ fn resolved(format: Format, mode: ResolveMode, samples: [[f32; 4]; 4]) -> [f32; 
     out[0]
 }
 
-#[test]
+#[gaurast_runner::test]
 fn floats_have_a_mean_and_integers_have_not() {
     let samples = [0.0, 1.0, 0.25, 0.75].map(|x| [x, 1.0, -x, 4.0 * x]);
     let float = Format::R32G32B32A32Sfloat;
@@ -37,7 +37,7 @@ fn floats_have_a_mean_and_integers_have_not() {
     assert_eq!(bits(unsigned, ResolveMode::Max), (-7i32).cast_unsigned());
 }
 
-#[test]
+#[gaurast_runner::test]
 fn one_sample_is_itself() {
     let mut out = [[0.0; 4]; 2];
     let row = [[0.1, 0.2, 0.3, 0.4], [f32::INFINITY; 4]];
@@ -63,7 +63,7 @@ fn image(format: Format, samples: u32) -> Arc<Image> {
     Arc::new(Image::new(desc, memory, 0).unwrap())
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_region_of_each_layer_is_resolved() {
     let source = image(Format::R8G8B8A8Srgb, 4);
     let target = image(Format::R8G8B8A8Srgb, 1);

@@ -21,19 +21,17 @@ fn worst_error<const TERMS: usize>(powers: &Powers<TERMS>, level: Level) -> f64 
     worst
 }
 
-#[test]
-fn powers_of_fewer_terms_are_within_their_bounds_at_every_level() {
-    for (name, level) in SimdLevel::supported() {
-        let level = level.resolve().unwrap();
-        for (worst, bound) in [
-            (worst_error(&CUBIC, level), CUBIC.error),
-            (worst_error(&QUADRATIC, level), QUADRATIC.error),
-        ] {
-            let bound = f64::from(bound);
-            assert!(worst <= bound, "{name}: {worst:e} exceeds {bound:e}");
-            // A bound that is far off would refuse these powers where they may be used.
-            assert!(worst > 0.9 * bound, "{name}: {worst:e}, not {bound:e}");
-        }
+#[gaurast_runner::test(each = simd_levels())]
+fn powers_of_fewer_terms_are_within_their_bounds(case: &Case) {
+    let level = token_of(case);
+    for (worst, bound) in [
+        (worst_error(&CUBIC, level), CUBIC.error),
+        (worst_error(&QUADRATIC, level), QUADRATIC.error),
+    ] {
+        let bound = f64::from(bound);
+        assert!(worst <= bound, "{worst:e} exceeds {bound:e}");
+        // A bound that is far off would refuse these powers where they may be used.
+        assert!(worst > 0.9 * bound, "{worst:e}, not {bound:e}");
     }
 }
 
@@ -47,14 +45,14 @@ fn allowing(exponential_error: f32, contribution_budget: f32) -> GaussianState {
     }
 }
 
-#[test]
-fn the_kernel_with_fast_powers_equals_its_naive_twin() {
+#[gaurast_runner::test(each = simd_levels())]
+fn the_kernel_with_fast_powers_equals_its_naive_twin(case: &Case) {
     for seed in 0..2 {
-        check(seed, 400, &allowing(1e-4, 0.0), WHOLE);
-        check(seed, 400, &allowing(1.0, 0.0), WHOLE);
+        check(case, seed, 400, &allowing(1e-4, 0.0), WHOLE);
+        check(case, seed, 400, &allowing(1.0, 0.0), WHOLE);
     }
     // What allows less than the cubic's error is exact.
-    check(3, 400, &allowing(7e-5, 0.0), WHOLE);
+    check(case, 3, 400, &allowing(7e-5, 0.0), WHOLE);
 }
 
 /// Pixels, and blocks that were left out.
@@ -78,37 +76,31 @@ fn picture(device: &Device, count: u32, state: GaussianState) -> (Vec<Option<[f3
     (pixels, range, counters.get(Counter::BlocksLeftOut))
 }
 
-#[test]
-fn what_is_left_out_is_within_the_budget() {
-    for (name, simd) in SimdLevel::supported() {
-        let device = Device::new(&Config {
-            simd,
-            ..Config::default()
-        })
-        .unwrap();
-        let (exact, range, none) = picture(&device, 3000, defaults());
-        assert_eq!(none, 0);
-        for budget in [0.004, 0.05, 0.4] {
-            let (pixels, _, left_out) = picture(&device, 3000, allowing(0.0, budget));
-            assert!(left_out > 0, "{name}, {budget}");
-            let mut worst = [0.0f32; 2];
-            for (exact, pixel) in exact.iter().zip(&pixels) {
-                assert_eq!(exact.is_some(), pixel.is_some());
-                let [exact, pixel] = [exact, pixel].map(|pixel| pixel.unwrap_or_default());
-                for (channel, (exact, pixel)) in exact.into_iter().zip(pixel).enumerate() {
-                    let worst = &mut worst[usize::from(channel == 3)];
-                    *worst = worst.max((exact - pixel).abs());
-                }
+#[gaurast_runner::test(each = simd_levels())]
+fn what_is_left_out_is_within_the_budget(case: &Case) {
+    let device = device_of(case);
+    let (exact, range, none) = picture(&device, 3000, defaults());
+    assert_eq!(none, 0);
+    for budget in [0.004, 0.05, 0.4] {
+        let (pixels, _, left_out) = picture(&device, 3000, allowing(0.0, budget));
+        assert!(left_out > 0, "{budget}");
+        let mut worst = [0.0f32; 2];
+        for (exact, pixel) in exact.iter().zip(&pixels) {
+            assert_eq!(exact.is_some(), pixel.is_some());
+            let [exact, pixel] = [exact, pixel].map(|pixel| pixel.unwrap_or_default());
+            for (channel, (exact, pixel)) in exact.into_iter().zip(pixel).enumerate() {
+                let worst = &mut worst[usize::from(channel == 3)];
+                *worst = worst.max((exact - pixel).abs());
             }
-            let [color, alpha] = worst;
-            assert!(color > 0.0, "{name}, {budget}: it is the same picture");
-            assert!(color <= budget * range + 1e-5, "{name}, {budget}: {color}");
-            assert!(alpha <= budget + 1e-6, "{name}, {budget}: {alpha}");
         }
+        let [color, alpha] = worst;
+        assert!(color > 0.0, "{budget}: it is the same picture");
+        assert!(color <= budget * range + 1e-5, "{budget}: {color}");
+        assert!(alpha <= budget + 1e-6, "{budget}: {alpha}");
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn skips_that_are_off_leave_nothing_out() {
     let device = Device::new(&Config {
         optimizations: Optimizations::NONE,

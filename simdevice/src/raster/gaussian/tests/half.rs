@@ -55,7 +55,7 @@ fn state() -> GaussianState {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn numbers_are_rounded_to_the_nearest_and_even() {
     // Every binary16 number, those halfway to the next, and those beside.
     for half in 0..0x7C00u32 {
@@ -85,7 +85,7 @@ fn numbers_are_rounded_to_the_nearest_and_even() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn powers_of_two_are_nearly_the_nearest() {
     let (mut worst, mut x) = (0.0f64, -14.0f32);
     while x <= 1.0 {
@@ -101,10 +101,10 @@ fn powers_of_two_are_nearly_the_nearest() {
     );
 }
 
-#[test]
-fn it_equals_its_definition_at_every_level() {
+#[gaurast_runner::test(each = simd_levels())]
+fn it_equals_its_definition(case: &Case) {
     for seed in 40..43 {
-        check(seed, 400, &state(), WHOLE);
+        check(case, seed, 400, &state(), WHOLE);
     }
     let lax = GaussianState {
         alpha_floor: 0.0,
@@ -113,10 +113,10 @@ fn it_equals_its_definition_at_every_level() {
         low_pass_variance: 0.0,
         ..state()
     };
-    check(43, 200, &lax, WHOLE);
+    check(case, 43, 200, &lax, WHOLE);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn tiles_and_blocks_list_whatever_it_reaches() {
     let device = Device::new(&Config::default()).unwrap();
     for (seed, low_pass_variance) in [(50, 0.3), (51, 0.3), (52, 0.01)] {

@@ -66,14 +66,14 @@ pub(super) fn naive_sample(
     out
 }
 
-#[test]
-fn it_equals_its_twin() {
+#[gaurast_runner::test(each = simd_levels())]
+fn it_equals_its_twin(case: &Case) {
     let state = GaussianState {
         order: GaussianOrder::PerPixel,
         ..defaults()
     };
     for seed in 20..23 {
-        check(seed, 400, &state, WHOLE);
+        check(case, seed, 400, &state, WHOLE);
     }
     // Everything contributes everywhere, in several passes.
     let state = GaussianState {
@@ -83,6 +83,7 @@ fn it_equals_its_twin() {
         ..state
     };
     check(
+        case,
         23,
         3 * crate::raster::gaussian::per_pixel::HELD as u32,
         &state,
@@ -90,7 +91,7 @@ fn it_equals_its_twin() {
     );
 }
 
-#[test]
+#[gaurast_runner::test]
 fn it_is_another_order() {
     let device = Device::new(&Config::default()).unwrap();
     let picture = |order| {

@@ -2,9 +2,10 @@ use super::*;
 use crate::geometry::{Primitive, PrimitiveKind};
 use crate::raster::tile::{CENTER, SAMPLES_4};
 use crate::raster::triangle::setup::Needs;
+use crate::token_of;
 use devmem::dispatch;
 use fearless_simd::Level;
-use isa::level::SimdLevel;
+use gaurast_runner::{Case, simd_levels};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -166,36 +167,34 @@ fn corners(rng: &mut ChaCha8Rng) -> [[i32; 2]; 3] {
     corners
 }
 
-#[test]
-fn coverage_is_that_of_exact_arithmetic_at_every_level() {
-    for (_, level) in SimdLevel::supported() {
-        let level = level.resolve().unwrap();
-        let mut rng = ChaCha8Rng::seed_from_u64(17);
-        let mut covered = 0;
-        for round in 0..400 {
-            let Some(corners) = oriented(corners(&mut rng)) else {
-                continue;
-            };
-            let kind = [PrimitiveKind::Triangle, PrimitiveKind::Line][usize::from(round % 5 == 4)];
-            let primitive = primitive(corners, kind);
-            let clip = if round % 3 == 0 {
-                Rect {
-                    x: rng.random_range(0..30),
-                    y: rng.random_range(0..30),
-                    width: rng.random_range(1..34),
-                    height: rng.random_range(1..34),
-                }
-            } else {
-                EVERYTHING
-            };
-            covered += compare::<1>(level, &primitive, &CENTER, clip);
-            covered += compare::<4>(level, &primitive, &SAMPLES_4, clip);
-        }
-        assert!(covered > 100_000, "{covered}");
+#[gaurast_runner::test(each = simd_levels())]
+fn coverage_is_that_of_exact_arithmetic(case: &Case) {
+    let level = token_of(case);
+    let mut rng = ChaCha8Rng::seed_from_u64(17);
+    let mut covered = 0;
+    for round in 0..400 {
+        let Some(corners) = oriented(corners(&mut rng)) else {
+            continue;
+        };
+        let kind = [PrimitiveKind::Triangle, PrimitiveKind::Line][usize::from(round % 5 == 4)];
+        let primitive = primitive(corners, kind);
+        let clip = if round % 3 == 0 {
+            Rect {
+                x: rng.random_range(0..30),
+                y: rng.random_range(0..30),
+                width: rng.random_range(1..34),
+                height: rng.random_range(1..34),
+            }
+        } else {
+            EVERYTHING
+        };
+        covered += compare::<1>(level, &primitive, &CENTER, clip);
+        covered += compare::<4>(level, &primitive, &SAMPLES_4, clip);
     }
+    assert!(covered > 100_000, "{covered}");
 }
 
-#[test]
+#[gaurast_runner::test]
 fn neighbours_share_no_sample_and_leave_none() {
     let level = Level::new();
     let mut rng = ChaCha8Rng::seed_from_u64(3);
@@ -224,7 +223,7 @@ fn neighbours_share_no_sample_and_leave_none() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_point_covers_a_half_open_square() {
     // From (1.5, 1.5) to (3.5, 3.5): the centres at 1.5 and 2.5 are inside, those at 3.5 are not.
     let square = primitive([[384, 384], [896, 384], [896, 896]], PrimitiveKind::Point);

@@ -9,6 +9,7 @@ use crate::format::{Aspect, ClearValue, Format};
 use crate::geometry::{Bins, PrimitiveKind, Varyings};
 use crate::geometry::{PrimitiveDraw, PrimitiveSegment};
 use crate::image::{Image, ImageDesc, ImageKind, ImageView};
+use crate::level_of;
 use crate::packet::{Attachment, LoadOp, Rendering, StoreOp};
 use crate::program::bindings::Bindings;
 use crate::program::vertex::DrawPipeline;
@@ -23,6 +24,7 @@ use crate::raster::tile::{CENTER, SAMPLES_4};
 use crate::state::*;
 use crate::state::{DrawState, Rect, Topology};
 use devmem::Allocation;
+use gaurast_runner::{Case, simd_levels};
 use isa::builder::Builder;
 use isa::ir::{Program, Rate, Statement, Type};
 use isa::level::SimdLevel;
@@ -244,13 +246,15 @@ fn run(
     counters
 }
 
-/// The configurations that must all give the same result.
-fn configs() -> Vec<Config> {
+/// The configurations of a level that must all give the same result.
+fn configs(simd: SimdLevel) -> [Config; 3] {
     let base = Config {
         threads: 1,
+        simd,
         ..Config::default()
     };
-    let mut configs = vec![
+    [
+        base.clone(),
         Config {
             macro_tile_size: 16,
             threads: 3,
@@ -259,22 +263,15 @@ fn configs() -> Vec<Config> {
         Config {
             macro_tile_size: 128,
             flush: FlushPolicy::EveryDraw,
-            ..base.clone()
+            ..base
         },
-    ];
-    configs.extend(SimdLevel::supported().into_iter().map(|(_, simd)| Config {
-        simd,
-        ..base.clone()
-    }));
-    configs
+    ]
 }
 
-#[test]
-fn interpolation_agrees_with_binary64() {
+#[gaurast_runner::test(each = simd_levels())]
+fn interpolation_agrees_with_binary64(case: &Case) {
     for (samples, each_shaded) in [(1, false), (4, false), (4, true)] {
-        for (_, simd) in SimdLevel::supported() {
-            interpolate(samples, each_shaded, simd);
-        }
+        interpolate(samples, each_shaded, level_of(case));
     }
 }
 
@@ -391,55 +388,53 @@ fn interpolate(samples: u32, each_shaded: bool, simd: SimdLevel) {
     }
 }
 
-#[test]
-fn where_each_sample_is_shaded_fragments_are_at_their_sample() {
-    for (_, simd) in SimdLevel::supported() {
-        let config = Config {
-            threads: 1,
-            simd,
-            ..Config::default()
+#[gaurast_runner::test(each = simd_levels())]
+fn where_each_sample_is_shaded_fragments_are_at_their_sample(case: &Case) {
+    let config = Config {
+        threads: 1,
+        simd: level_of(case),
+        ..Config::default()
+    };
+    let target = image(Format::R32G32B32A32Sfloat, 4, 1);
+    let rendering = Rendering {
+        area: EVERYTHING,
+        layer_count: 1,
+        view_mask: 0,
+        color: vec![Some(attachment(&target, ClearValue::Float([-9.0; 4])))],
+        depth: None,
+        stencil: None,
+    };
+    run(&config, &rendering, |device| {
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        let everywhere = Primitive {
+            corners: [[-1000, -1000], [100_000, -1000], [-1000, 100_000]],
+            ..triangle(&mut rng, 0)
         };
-        let target = image(Format::R32G32B32A32Sfloat, 4, 1);
-        let rendering = Rendering {
-            area: EVERYTHING,
-            layer_count: 1,
-            view_mask: 0,
-            color: vec![Some(attachment(&target, ClearValue::Float([-9.0; 4])))],
-            depth: None,
-            stencil: None,
+        let inputs = vec![FragmentInput::FragCoord(0), FragmentInput::FragCoord(1)];
+        let mut outputs = color(0, 0);
+        outputs.truncate(2);
+        let state = DrawState {
+            sample_shading: true,
+            ..state(4)
         };
-        run(&config, &rendering, |device| {
-            let mut rng = ChaCha8Rng::seed_from_u64(4);
-            let everywhere = Primitive {
-                corners: [[-1000, -1000], [100_000, -1000], [-1000, 100_000]],
-                ..triangle(&mut rng, 0)
-            };
-            let inputs = vec![FragmentInput::FragCoord(0), FragmentInput::FragCoord(1)];
-            let mut outputs = color(0, 0);
-            outputs.truncate(2);
-            let state = DrawState {
-                sample_shading: true,
-                ..state(4)
-            };
-            let stage = fragments(inputs, outputs, false);
-            vec![draw(
-                device,
-                Some(stage),
-                state,
-                vec![everywhere],
-                Vec::new(),
-                0,
-            )]
-        });
-        for (sample, place) in (0..).zip(SAMPLES_4) {
-            for at in 0..WIDTH * HEIGHT {
-                let pixel = [at % WIDTH, at / WIDTH];
-                let bytes = texel(&target, Aspect::Color, 0, sample, pixel);
-                let found = Format::R32G32B32A32Sfloat.decode(&bytes);
-                let expected =
-                    [0, 1].map(|axis: usize| pixel[axis] as f32 + place[axis] as f32 / 256.0);
-                assert_eq!(found[..2], expected);
-            }
+        let stage = fragments(inputs, outputs, false);
+        vec![draw(
+            device,
+            Some(stage),
+            state,
+            vec![everywhere],
+            Vec::new(),
+            0,
+        )]
+    });
+    for (sample, place) in (0..).zip(SAMPLES_4) {
+        for at in 0..WIDTH * HEIGHT {
+            let pixel = [at % WIDTH, at / WIDTH];
+            let bytes = texel(&target, Aspect::Color, 0, sample, pixel);
+            let found = Format::R32G32B32A32Sfloat.decode(&bytes);
+            let expected =
+                [0, 1].map(|axis: usize| pixel[axis] as f32 + place[axis] as f32 / 256.0);
+            assert_eq!(found[..2], expected);
         }
     }
 }

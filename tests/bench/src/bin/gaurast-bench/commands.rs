@@ -38,6 +38,10 @@ pub struct CommandsArguments {
 pub struct CommandsWorkerArguments {
     draws: u32,
     pipelines: u32,
+
+    /// Executes the draws too
+    #[arg(long)]
+    submit: bool,
 }
 
 /// Measures, and prints a row for each kind of work.
@@ -48,7 +52,7 @@ pub fn run(arguments: &CommandsArguments) -> Result<(), BenchError> {
     let work = Work::new(vulkan_gaurast::entry())?;
     let (draws, pipelines) = (arguments.draws, arguments.pipelines);
     let runs = || 0..arguments.runs;
-    let recorded = runs().map(|_| work.record_draws(draws));
+    let recorded = runs().map(|_| work.record_draws(draws, false));
     let recorded = recorded.collect::<Result<Vec<_>, _>>()?;
     let created = runs().map(|_| work.create_pipelines(pipelines));
     let created = created.collect::<Result<Vec<_>, _>>()?;
@@ -89,7 +93,7 @@ fn instructions((draws, pipelines): (u32, u32)) -> Result<u64, BenchError> {
 /// If the driver refuses it.
 pub fn work(arguments: &CommandsWorkerArguments) -> Result<(), BenchError> {
     let work = Work::new(vulkan_gaurast::entry())?;
-    work.record_draws(arguments.draws)?;
+    work.record_draws(arguments.draws, arguments.submit)?;
     work.create_pipelines(arguments.pipelines)?;
     Ok(())
 }
@@ -102,7 +106,7 @@ mod tests {
     fn the_driver_takes_the_work() {
         let work = Work::new(vulkan_gaurast::entry()).expect("a device");
         for _ in 0..2 {
-            work.record_draws(10).expect("recorded");
+            work.record_draws(10, true).expect("recorded");
             work.create_pipelines(2).expect("created");
         }
     }

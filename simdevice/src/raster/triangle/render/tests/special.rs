@@ -47,7 +47,7 @@ fn rendering(color: Vec<Attachment>) -> Rendering {
 
 const WIDE: Format = Format::R32G32B32A32Sfloat;
 
-#[test]
+#[gaurast_runner::test]
 fn each_sample_is_shaded_for_itself() {
     let target = image(WIDE, 4, 1);
     let inputs = vec![
@@ -89,7 +89,7 @@ fn each_sample_is_shaded_for_itself() {
     assert_eq!(counters.get(Counter::SamplesPassed), all);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn centroids_lie_within_the_primitive() {
     let target = image(WIDE, 4, 1);
     // Half a pixel wide, between the edge of pixels and their centres. The centres are outside, where the varying is
@@ -141,7 +141,7 @@ fn centroids_lie_within_the_primitive() {
     assert!(covered > 30 && outside > 5, "{covered} {outside}");
 }
 
-#[test]
+#[gaurast_runner::test]
 fn primitives_go_to_their_layer_and_samples_are_resolved() {
     let (target, resolved) = (
         image(Format::R8G8B8A8Unorm, 4, 2),
@@ -212,12 +212,12 @@ fn counting() -> FragmentPrograms {
     }
 }
 
-#[test]
-fn a_pass_without_attachments_has_side_effects_of_what_is_covered() {
+#[gaurast_runner::test(each = simd_levels())]
+fn a_pass_without_attachments_has_side_effects_of_what_is_covered(case: &Case) {
     let memory = Allocation::new_zeroed(64).unwrap();
     let mut rng = ChaCha8Rng::seed_from_u64(9);
     let primitives: Vec<_> = (0..50).map(|index| triangle(&mut rng, index)).collect();
-    for config in configs() {
+    for config in configs(level_of(case)) {
         memory.fill(0, 64, 0).unwrap();
         let generation = memory.generation();
         let counters = run(&config, &rendering(Vec::new()), |device| {
@@ -243,7 +243,7 @@ fn a_pass_without_attachments_has_side_effects_of_what_is_covered() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_program_that_does_not_end_is_stopped() {
     let mut b = Builder::new();
     b.begin_loop();

@@ -524,9 +524,9 @@ fn render(scene: &Scene, config: &Config) -> Picture {
     picture
 }
 
-#[test]
-fn random_states_agree_with_the_twin_whatever_the_configuration() {
-    let configs = configs();
+#[gaurast_runner::test(each = simd_levels())]
+fn random_states_agree_with_the_twin_whatever_the_configuration(case: &Case) {
+    let configs = configs(level_of(case));
     for seed in 0..48 {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let scene = scene(&mut rng);

@@ -1,4 +1,4 @@
-//! Work for the driver alone: draws are recorded and pipelines are created. Nothing is submitted.
+//! Work for the driver alone: draws are recorded, and executed if that is asked for, and pipelines are created.
 //!
 //! This file uses only ash and an entry, so that it can be compiled with any revision of this driver, or with another
 //! driver.
@@ -27,6 +27,7 @@ pub struct Work {
     layout: vk::PipelineLayout,
     pool: vk::CommandPool,
     commands: vk::CommandBuffer,
+    queue: vk::Queue,
     pipeline: vk::Pipeline,
     // The functions of the handles above.
     _entry: Entry,
@@ -115,6 +116,7 @@ impl Work {
                 layout,
                 pool,
                 commands,
+                queue: device.get_device_queue(0, 0),
                 pipeline: vk::Pipeline::null(),
                 device,
                 _entry: entry,
@@ -201,11 +203,11 @@ impl Work {
     }
 
     /// Records `count` draws into one pass, each with a scissor and a vertex buffer of its own, and returns the time
-    /// that it took.
+    /// that it took. If `submits`, the draws are then executed, which is not in this time.
     ///
     /// # Errors
-    /// The error of recording.
-    pub fn record_draws(&self, count: u32) -> Result<Duration, vk::Result> {
+    /// The error of recording or of the submission.
+    pub fn record_draws(&self, count: u32, submits: bool) -> Result<Duration, vk::Result> {
         let (device, commands) = (&self.device, self.commands);
         let area = vk::Rect2D {
             offset: vk::Offset2D::default(),
@@ -222,9 +224,27 @@ impl Work {
             .render_area(area)
             .layer_count(1)
             .color_attachments(&target);
-        // SAFETY: commands are in order, and the command buffer is not in use.
+        let color = vk::ImageSubresourceRange::default()
+            .aspect_mask(vk::ImageAspectFlags::COLOR)
+            .level_count(1)
+            .layer_count(1);
+        let to_target = vk::ImageMemoryBarrier::default()
+            .image(self.image)
+            .subresource_range(color)
+            .dst_access_mask(vk::AccessFlags::COLOR_ATTACHMENT_WRITE)
+            .new_layout(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL);
+        // SAFETY: commands are in order, and the command buffer is not in use before it is submitted or reset.
         unsafe {
             device.begin_command_buffer(commands, &Default::default())?;
+            device.cmd_pipeline_barrier(
+                commands,
+                vk::PipelineStageFlags::TOP_OF_PIPE,
+                vk::PipelineStageFlags::COLOR_ATTACHMENT_OUTPUT,
+                vk::DependencyFlags::empty(),
+                &[],
+                &[],
+                &[to_target],
+            );
             device.cmd_begin_rendering(commands, &pass);
             device.cmd_bind_pipeline(commands, vk::PipelineBindPoint::GRAPHICS, self.pipeline);
             let start = Instant::now();
@@ -237,6 +257,12 @@ impl Work {
             let taken = start.elapsed();
             device.cmd_end_rendering(commands);
             device.end_command_buffer(commands)?;
+            if submits {
+                let buffers = [commands];
+                let submission = vk::SubmitInfo::default().command_buffers(&buffers);
+                device.queue_submit(self.queue, &[submission], vk::Fence::null())?;
+                device.queue_wait_idle(self.queue)?;
+            }
             device.reset_command_pool(self.pool, vk::CommandPoolResetFlags::RELEASE_RESOURCES)?;
             Ok(taken)
         }
@@ -246,7 +272,7 @@ impl Work {
 impl Drop for Work {
     fn drop(&mut self) {
         let device = &self.device;
-        // SAFETY: nothing was submitted, and each object is destroyed before the objects that it uses.
+        // SAFETY: nothing is in use any more, and each object is destroyed before the objects that it uses.
         unsafe {
             device.destroy_command_pool(self.pool, None);
             device.destroy_pipeline(self.pipeline, None);

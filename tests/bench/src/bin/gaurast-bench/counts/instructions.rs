@@ -3,8 +3,6 @@
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use clap::ValueEnum;
-
 use super::error::{CountsError, Obstacle};
 use super::pictures;
 use super::report::Report;
@@ -49,9 +47,9 @@ pub(super) fn check(report: &mut Report, runs: u32, store: bool) -> Result<(), C
         1,
     )?;
     let mut rows = Rows::new(&["workload", "instructions", "stored", "change", "spread"]);
-    for workload in Workload::value_variants() {
+    for workload in Workload::stored() {
         let mut counts = (0..runs)
-            .map(|_| count(*workload, None))
+            .map(|_| count(workload, None))
             .collect::<Result<Vec<_>, _>>()?;
         counts.sort_unstable();
         let (count, name) = (counts[counts.len() / 2], workload.name());

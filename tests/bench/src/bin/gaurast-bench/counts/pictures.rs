@@ -3,8 +3,6 @@
 use std::collections::BTreeMap;
 use std::process::Command;
 
-use clap::ValueEnum;
-
 use super::error::CountsError;
 use super::report::Report;
 use super::stored::Table;
@@ -72,7 +70,7 @@ pub(super) fn check(report: &mut Report, store: bool) -> Result<(), CountsError>
 
 /// The hash of every workload's picture, by name.
 fn hashes(level: &str, threads: usize) -> Result<BTreeMap<String, String>, CountsError> {
-    let workloads = Workload::value_variants().iter().map(|one| one.name());
+    let workloads = Workload::stored().map(Workload::name);
     let output = Command::new(std::env::current_exe()?)
         .args([WORKER, "--frames", "2"])
         .args(workloads)

@@ -15,9 +15,6 @@ use super::objects::{Objects, begin_image};
 /// Triangles of [`Triangles::small`].
 const SMALL: usize = 15_000;
 
-/// Layers of [`Triangles::layered`].
-const LAYERS: u32 = 8;
-
 /// Width and height of the texture's first level.
 const TEXTURE: u32 = 256;
 
@@ -62,9 +59,13 @@ impl Triangles {
 
     /// Layers that fill the picture, each of one colour. Those of the left half are drawn from back to front, those of
     /// the right half from front to back.
-    pub(super) fn layered(entry: ash::Entry, size: [u32; 2]) -> Result<Self, RenderError> {
+    pub(super) fn layered(
+        entry: ash::Entry,
+        size: [u32; 2],
+        count: u32,
+    ) -> Result<Self, RenderError> {
         let fragment = include_bytes!("shaders/plain.frag.spv");
-        Self::new(entry, size, &layers(), fragment)
+        Self::new(entry, size, &layers(count), fragment)
     }
 
     fn new(
@@ -360,11 +361,11 @@ fn small(size: [u32; 2]) -> Vec<Vertex> {
 }
 
 /// Two triangles for each layer of each half of the picture.
-fn layers() -> Vec<Vertex> {
+fn layers(count: u32) -> Vec<Vertex> {
     let mut vertices = Vec::new();
-    for layer in 0..LAYERS {
-        let far = (LAYERS - layer) as f32 / (LAYERS + 1) as f32;
-        let near = (layer + 1) as f32 / (LAYERS + 1) as f32;
+    for layer in 0..count {
+        let far = (count - layer) as f32 / (count + 1) as f32;
+        let near = (layer + 1) as f32 / (count + 1) as f32;
         for (left, right, z) in [(-1.0, 0.0, far), (0.0, 1.0, near)] {
             let corners = [[left, -1.0], [right, -1.0], [left, 1.0], [right, 1.0]];
             let corners = corners.map(|[x, y]: [f32; 2]| Vertex {

@@ -21,6 +21,9 @@ const SIZE: [u32; 2] = [640, 360];
 /// Gaussians of the scenes.
 const GAUSSIANS: usize = 20_000;
 
+/// Layers of triangles, which fill the picture.
+const LAYERS: u32 = 8;
+
 /// Quads, each of which is two triangles of many pixels.
 const QUADS: usize = 3000;
 
@@ -40,6 +43,8 @@ pub(super) enum Workload {
     TexturedTriangles,
     /// Layers that hide one another
     LayeredTriangles,
+    /// One layer that fills the picture, as of post-processing
+    OneLayer,
     /// A smaller synthetic scene as sorted, blended quads
     BlendedQuads,
     /// A dispatch with workgroup memory
@@ -66,6 +71,12 @@ pub struct WorkerArguments {
 }
 
 impl Workload {
+    /// The workloads whose counts are stored. The others only show what an optimization saves.
+    pub(super) fn stored() -> impl Iterator<Item = Self> {
+        let all = Self::value_variants().iter().copied();
+        all.filter(|&workload| workload != Self::OneLayer)
+    }
+
     /// The name, as in the stored tables.
     pub(super) fn name(self) -> String {
         self.to_possible_value()
@@ -91,7 +102,8 @@ impl Workload {
             }
             Self::SmallTriangles => triangles(Triangles::small(entry, SIZE)?, frames),
             Self::TexturedTriangles => triangles(Triangles::textured(entry, SIZE)?, frames),
-            Self::LayeredTriangles => triangles(Triangles::layered(entry, SIZE)?, frames),
+            Self::LayeredTriangles => triangles(Triangles::layered(entry, SIZE, LAYERS)?, frames),
+            Self::OneLayer => triangles(Triangles::layered(entry, SIZE, 1)?, frames),
             Self::BlendedQuads => quads(entry, frames),
             Self::Compute => {
                 let mut bodies = Bodies::new(entry)?;

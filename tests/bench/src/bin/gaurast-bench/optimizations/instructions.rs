@@ -16,11 +16,10 @@ use crate::workload::{Extra, Source, Workload};
 const SIZE: [u32; 2] = [640, 360];
 
 /// Gaussians of a scene.
-const COUNT: usize = 100_000;
+const COUNT: usize = 20_000;
 
-/// The number of the counted frame. From the second frame on, each frame builds a part of the clusters, which are
-/// complete by this one.
-const WARM: usize = 6;
+/// The number of the counted frame. The second frame builds clusters of Gaussians.
+const WARM: usize = 3;
 
 /// The work of a scene.
 #[derive(Clone)]
@@ -97,21 +96,26 @@ fn cases() -> Vec<(&'static str, Scene)> {
         ..Workload::new(Source::Wall, SIZE)
     };
     let whole = |workload: &Workload, name: &str| Scene::gaussians(name, workload, Path::Own, WARM);
-    let room = || whole(&base, "100k Gaussians");
-    let half_seen = || whole(&beside, "100k Gaussians, as many beside the picture");
+    let room = || whole(&base, "20,000 Gaussians");
+    let half_seen = || whole(&beside, "20,000 Gaussians, as many beside the picture");
     let first = Scene::gaussians(
-        "100k Gaussians, as many beside the picture, drawn for the first time",
+        "20,000 Gaussians, as many beside the picture, drawn for the first time",
         &beside,
         Path::Own,
         1,
     );
     let object = Scene::gaussians(
-        "100k Gaussians from afar: an object on an empty background",
+        "20,000 Gaussians from afar: an object on an empty background",
         &base,
         Path::Afar,
         WARM,
     );
-    let still = Scene::gaussians("100k Gaussians, a camera at rest", &base, Path::Still, WARM);
+    let still = Scene::gaussians(
+        "20,000 Gaussians, a camera at rest",
+        &base,
+        Path::Still,
+        WARM,
+    );
     let small = || Scene::counted("small triangles", "small-triangles");
     let layers = || Scene::counted("layers that hide one another", "layered-triangles");
     let floor = || Scene::counted("a textured floor", "textured-triangles");
@@ -119,7 +123,7 @@ fn cases() -> Vec<(&'static str, Scene)> {
         ("cluster-culling", half_seen()),
         (
             "occlusion-culling",
-            whole(&behind, "100k Gaussians behind a wall"),
+            whole(&behind, "20,000 Gaussians behind a wall"),
         ),
         (TEMPORAL_REUSE, still),
         ("bounds", room()),
@@ -131,10 +135,14 @@ fn cases() -> Vec<(&'static str, Scene)> {
         ("early-termination", room()),
         (
             "early-termination",
-            whole(&behind, "100k Gaussians behind a wall"),
+            whole(&behind, "20,000 Gaussians behind a wall"),
         ),
         ("empty-tiles", object),
         ("overwritten-tiles", floor()),
+        (
+            "overwritten-tiles",
+            Scene::counted("a layer that fills the picture", "one-layer"),
+        ),
         ("masked-quads", small()),
         ("affine", small()),
         ("overwritten-quads", layers()),
