@@ -75,7 +75,7 @@ may_install() {
 
 # python_packages NAME==VERSION...: installs packages of PyPI into an environment of their own; $python is its Python.
 python_packages() {
-    environment=$cache/$(echo "python $*" | tr ' =' '-.')
+    environment=$cache/$(echo "python $*" | tr -s ' =' '-')
     python=$environment/bin/python
     [ ! -e "$environment/complete" ] || return 0
     may_install "$1"
@@ -90,7 +90,7 @@ python_packages() {
 # node_packages NAME@VERSION...: installs packages of npm; $modules is their folder.
 node_packages() {
     need node npm
-    environment=$cache/$(echo "node $*" | tr ' /@' '-..')
+    environment=$cache/$(echo "node $*" | tr -s ' /@' '-')
     modules=$environment/node_modules
     [ ! -e "$environment/complete" ] || return 0
     may_install "$1"

@@ -69,17 +69,17 @@ def expect(what, found, want, tolerance):
 
 
 def share(pixels, colour):
-    return (np.abs(pixels - np.array(colour)) <= 2).all(-1).mean()
+    """The part of the pixels that is nearer to a colour than to black. Edges are smoothed."""
+    return (np.abs(pixels - np.array(colour)) < 128).all(-1).mean()
 
 
-expect("the plane's share", share(region(-100, 100, 50), (255, 0, 0)), 0.64, 0.005)
+expect("the plane's share", share(region(-100, 100, 50), (255, 0, 0)), 0.64, 0.01)
 green = region(0, 100, 50)
-expect("the sphere's share", ((green[..., 1] > 20) & (green[..., 0] < 5)).mean(), np.pi * 0.45**2, 0.02)
+expect("the sphere's share", (green[..., 1] > 64).mean(), np.pi * 0.45**2, 0.02)
 assert green[50, 50, 1] > green[50, 90, 1] + 30, "the sphere is not lit from the front"
-expect("the checker's white", share(region(100, 100, 50), (255, 255, 255)), 0.32, 0.01)
+expect("the checker's white", share(region(100, 100, 50), (255, 255, 255)), 0.32, 0.02)
 expect("the line's share", share(region(-100, 0, 50), (255, 255, 0)), (80 * 20 + np.pi * 100) / 1e4, 0.02)
 expect("the point's share", share(region(0, 0, 50), (0, 255, 255)), np.pi * 0.3**2, 0.02)
 expect("the volume's share", (region(100, 0, 20)[..., 0] > 60).mean(), 0.16, 0.02)
-text = region(0, -100, 50)
-expect("the text's share", (picture[260:340, 60:340].mean(-1) > 128).mean(), 0.16, 0.08)
+expect("the text's share", (picture[260:340, 60:340].mean(-1) > 128).mean(), 0.16, 0.04)
 print(f"{renderer.device.adapter.info['device']}: seven objects cover what they must")
