@@ -36,6 +36,7 @@ struct Room {
 }
 
 impl Room {
+    /// The room of numbers of descriptors of each type.
     fn of(kinds: impl IntoIterator<Item = (vk::DescriptorType, u64)>) -> Self {
         let mut room = Self::default();
         for (kind, count) in kinds {
@@ -48,6 +49,7 @@ impl Room {
         room
     }
 
+    /// The sum.
     fn with(self, other: Self) -> Self {
         Self {
             descriptors: self.descriptors.saturating_add(other.descriptors),
@@ -55,6 +57,7 @@ impl Room {
         }
     }
 
+    /// The difference, at least zero.
     fn without(self, other: Self) -> Self {
         Self {
             descriptors: self.descriptors.saturating_sub(other.descriptors),
