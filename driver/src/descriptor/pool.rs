@@ -11,7 +11,7 @@ use std::mem::MaybeUninit;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// A descriptor pool. It owns the handles of its sets, and allocates no more sets and descriptors than it was made for.
-/// Descriptors of all types take the same room, as in most drivers, and programs rely on that: GStreamer 1.22 names
+/// Descriptors of all types take the same room. Programs rely on that, as other drivers allow it: GStreamer 1.22 names
 /// one type of the two that it allocates. Bytes of inline uniform blocks are counted apart.
 #[derive(Debug)]
 pub(crate) struct DescriptorPool {
