@@ -21,10 +21,6 @@ for program in vkcube vkcubepp; do
 done
 
 if command -v vkcube-wayland > /dev/null && command -v weston > /dev/null; then
-    XDG_RUNTIME_DIR=$out/runtime
-    export XDG_RUNTIME_DIR
-    mkdir -p "$XDG_RUNTIME_DIR"
-    chmod 700 "$XDG_RUNTIME_DIR"
     weston --backend=headless-backend.so --use-pixman --socket=gaurast --width=800 --height=600 --idle-time=0 \
         --debug > "$out/weston.log" 2>&1 &
     weston=$!

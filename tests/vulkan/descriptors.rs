@@ -36,14 +36,14 @@ fn pools_give_what_they_have() {
         };
         let exhausted = Err(vk::Result::ERROR_OUT_OF_POOL_MEMORY);
         assert_eq!(allocate(&[one, one, one, one]), exhausted, "sets");
-        assert_eq!(allocate(&[many, many]), exhausted, "uniform buffers");
+        assert_eq!(allocate(&[many, many]), exhausted, "descriptors");
         let first = allocate(&[many]).unwrap();
         let second = allocate(&[one, one]).unwrap();
         assert_eq!(allocate(&[one]), exhausted, "all sets are given");
         gpu.device()
             .free_descriptor_sets(pool, &second[..1])
             .unwrap();
-        assert_eq!(allocate(&[many]), exhausted, "storage buffers");
+        assert_eq!(allocate(&[many]), exhausted, "descriptors, one set freed");
         let third = allocate(&[one]).unwrap();
         let all = [first[0], second[1], third[0], vk::DescriptorSet::null()];
         gpu.device().free_descriptor_sets(pool, &all).unwrap();
@@ -54,6 +54,35 @@ fn pools_give_what_they_have() {
         gpu.device().destroy_descriptor_pool(pool, None);
         gpu.device().destroy_descriptor_set_layout(one, None);
         gpu.device().destroy_descriptor_set_layout(many, None);
+    }
+}
+
+/// GStreamer's filters make a pool of combined image samplers alone, and allocate uniform buffers of it too.
+#[gaurast_runner::test]
+fn pools_give_descriptors_of_other_types() {
+    let gpu = open();
+    let both = set_layout(&gpu, &[(0, UNIFORM, 1), (1, STORAGE, 1)], NO_FLAGS);
+    let sizes = [vk::DescriptorPoolSize::default()
+        .ty(STORAGE)
+        .descriptor_count(3)];
+    let info = vk::DescriptorPoolCreateInfo::default()
+        .max_sets(3)
+        .pool_sizes(&sizes);
+    // SAFETY: see the crate.
+    unsafe {
+        let pool = gpu.device().create_descriptor_pool(&info, None).unwrap();
+        let layouts = [both];
+        let info = vk::DescriptorSetAllocateInfo::default()
+            .descriptor_pool(pool)
+            .set_layouts(&layouts);
+        gpu.device().allocate_descriptor_sets(&info).unwrap();
+        assert_eq!(
+            gpu.device().allocate_descriptor_sets(&info),
+            Err(vk::Result::ERROR_OUT_OF_POOL_MEMORY),
+            "four descriptors of a pool of three"
+        );
+        gpu.device().destroy_descriptor_pool(pool, None);
+        gpu.device().destroy_descriptor_set_layout(both, None);
     }
 }
 

@@ -321,6 +321,20 @@ impl Types {
         self.matrix_layouts.get(&matrix).copied().flatten()
     }
 
+    /// The bytes between elements of a type in all arrays of them; None if these differ, or none has a stride.
+    pub fn stride_of_arrays(&self, of: u32) -> Option<u32> {
+        let mut strides = self.entries.values().filter_map(|entry| match entry.ty {
+            Type::Array { element, stride, .. } | Type::RuntimeArray { element, stride }
+                if element == of =>
+            {
+                stride
+            }
+            _ => None,
+        });
+        let first = strides.next()?;
+        strides.all(|stride| stride == first).then_some(first)
+    }
+
     /// A type by id.
     pub fn get(&self, id: u32) -> Result<&Type> {
         match self.entries.get(&id) {

@@ -6,24 +6,64 @@ use crate::abi::error::Error;
 use crate::abi::handle::{self, objects};
 use crate::abi::valid;
 use ash::vk;
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 use std::mem::MaybeUninit;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// A descriptor pool. It owns the handles of its sets, and allocates no more than its maximum.
+/// A descriptor pool. It owns the handles of its sets, and allocates no more sets and descriptors than it was made for.
+/// Descriptors of all types take the same room. Programs rely on that, as other drivers allow it: GStreamer 1.22 names
+/// one type of the two that it allocates. Bytes of inline uniform blocks are counted apart.
 #[derive(Debug)]
 pub(crate) struct DescriptorPool {
     max_sets: usize,
-    sizes: HashMap<vk::DescriptorType, u64>,
+    size: Room,
     flags: vk::DescriptorPoolCreateFlags,
     allocated: Mutex<Allocated>,
 }
 
-/// The allocated sets, and the number of their descriptors of each kind.
+/// The allocated sets, and what they take.
 #[derive(Debug, Default)]
 struct Allocated {
     sets: HashSet<vk::DescriptorSet>,
-    descriptors: HashMap<vk::DescriptorType, u64>,
+    taken: Room,
+}
+
+/// Numbers of descriptors of all types but inline uniform blocks, and of bytes in those.
+#[derive(Clone, Copy, Debug, Default)]
+struct Room {
+    descriptors: u64,
+    inline_bytes: u64,
+}
+
+impl Room {
+    /// The room of numbers of descriptors of each type.
+    fn of(kinds: impl IntoIterator<Item = (vk::DescriptorType, u64)>) -> Self {
+        let mut room = Self::default();
+        for (kind, count) in kinds {
+            let place = match kind {
+                vk::DescriptorType::INLINE_UNIFORM_BLOCK => &mut room.inline_bytes,
+                _ => &mut room.descriptors,
+            };
+            *place = place.saturating_add(count);
+        }
+        room
+    }
+
+    /// The sum.
+    fn with(self, other: Self) -> Self {
+        Self {
+            descriptors: self.descriptors.saturating_add(other.descriptors),
+            inline_bytes: self.inline_bytes.saturating_add(other.inline_bytes),
+        }
+    }
+
+    /// The difference, at least zero.
+    fn without(self, other: Self) -> Self {
+        Self {
+            descriptors: self.descriptors.saturating_sub(other.descriptors),
+            inline_bytes: self.inline_bytes.saturating_sub(other.inline_bytes),
+        }
+    }
 }
 
 objects! { vk::DescriptorPool => DescriptorPool; }
@@ -35,13 +75,12 @@ impl DescriptorPool {
         pool_sizes: &[vk::DescriptorPoolSize],
         flags: vk::DescriptorPoolCreateFlags,
     ) -> Self {
-        let mut sizes = HashMap::new();
-        for size in pool_sizes {
-            *sizes.entry(size.ty).or_default() += u64::from(size.descriptor_count);
-        }
+        let sizes = pool_sizes
+            .iter()
+            .map(|size| (size.ty, u64::from(size.descriptor_count)));
         Self {
             max_sets: max_sets as usize,
-            sizes,
+            size: Room::of(sizes),
             flags,
             allocated: Mutex::default(),
         }
@@ -65,7 +104,7 @@ impl DescriptorPool {
         variable_counts: &[u32],
     ) -> Result<Vec<vk::DescriptorSet>, Error> {
         let mut allocated = self.lock();
-        let mut wanted = allocated.descriptors.clone();
+        let mut wanted = allocated.taken;
         let after_bind = vk::DescriptorPoolCreateFlags::UPDATE_AFTER_BIND;
         for (index, layout) in layouts.iter().enumerate() {
             if layout.is_updated_after_bind() && !self.flags.contains(after_bind) {
@@ -75,9 +114,7 @@ impl DescriptorPool {
                 ));
             }
             let variable = variable_counts.get(index).copied().unwrap_or(0);
-            for (kind, count) in layout.kinds(variable) {
-                *wanted.entry(kind).or_default() += count;
-            }
+            wanted = wanted.with(Room::of(layout.kinds(variable)));
         }
         let sets = allocated.sets.len() + layouts.len();
         if sets > self.max_sets {
@@ -86,11 +123,17 @@ impl DescriptorPool {
                 self.max_sets
             )));
         }
-        for (kind, &count) in &wanted {
-            let size = self.sizes.get(kind).copied().unwrap_or(0);
-            if count > size {
+        for (what, wanted, size) in [
+            ("descriptors", wanted.descriptors, self.size.descriptors),
+            (
+                "bytes of inline uniform blocks",
+                wanted.inline_bytes,
+                self.size.inline_bytes,
+            ),
+        ] {
+            if wanted > size {
                 return Err(Error::OutOfPoolMemory(format!(
-                    "{count} descriptors of type {kind:?} are wanted of a pool of {size}"
+                    "{wanted} {what} are wanted of a pool of {size}"
                 )));
             }
         }
@@ -101,7 +144,7 @@ impl DescriptorPool {
         let sets: Vec<_> = sets.collect::<Result<_, Error>>()?;
         let sets: Vec<_> = sets.into_iter().map(handle::create).collect();
         allocated.sets.extend(&sets);
-        allocated.descriptors = wanted;
+        allocated.taken = wanted;
         Ok(sets)
     }
 
@@ -132,10 +175,8 @@ impl DescriptorPool {
             }
             // SAFETY: the pool made the handle and has not destroyed it, and the caller no longer uses it.
             if let Some(set) = unsafe { handle::destroy(set) }? {
-                for (kind, count) in set.layout().kinds(set.variable_count()) {
-                    let taken = allocated.descriptors.entry(kind).or_default();
-                    *taken = taken.saturating_sub(count);
-                }
+                let room = Room::of(set.layout().kinds(set.variable_count()));
+                allocated.taken = allocated.taken.without(room);
             }
         }
         Ok(())

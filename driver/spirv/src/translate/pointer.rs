@@ -207,25 +207,35 @@ fn place_of_part(t: &mut Translator, mut place: MemoryRef, index: Index) -> Resu
 /// A place moved by `index * stride` bytes.
 fn moved(t: &mut Translator, mut place: MemoryRef, index: Index, stride: u32) -> Result<MemoryRef> {
     match index {
-        Index::Constant(index) if place.space != Space::Global || index < 1 << 31 => {
-            let bytes = u64::from(index) * u64::from(stride) + u64::from(place.offset);
-            place.offset = u32::try_from(bytes).unwrap_or(u32::MAX);
-        }
-        _ if place.space == Space::Global => {
-            let wide = match index {
-                Index::Constant(index) => t.emit.u64(i64::from(index.cast_signed()) as u64),
-                Index::Dynamic { reg, scalar } => {
-                    let signed = matches!(scalar, Scalar::Int { signed: true, .. });
-                    t.emit
-                        .op(if signed { Ir::SToS64 } else { Ir::UToU64 }, &[reg])
+        Index::Constant(index) => {
+            let bytes = i64::from(index.cast_signed()) * i64::from(stride);
+            let bytes = bytes.saturating_add(i64::from(place.offset));
+            match (u32::try_from(bytes), place.base) {
+                (Ok(bytes), _) => place.offset = bytes,
+                (Err(_), Some(base)) if place.space == Space::Global => {
+                    let bytes = t.emit.u64(bytes.cast_unsigned());
+                    place.base = Some(t.emit.op(Ir::IAdd64, &[base, bytes]));
+                    place.offset = 0;
                 }
-            };
+                // Back from what the base points to. The sum wraps around.
+                (Err(_), Some(base)) if i32::try_from(bytes).is_ok() => {
+                    let bytes = t.emit.u32((bytes as i32).cast_unsigned());
+                    place.base = Some(t.emit.op(Ir::IAdd, &[base, bytes]));
+                    place.offset = 0;
+                }
+                // Beyond all memory.
+                _ => place.offset = u32::MAX,
+            }
+        }
+        Index::Dynamic { reg, scalar } if place.space == Space::Global => {
+            let signed = matches!(scalar, Scalar::Int { signed: true, .. });
+            let widen = if signed { Ir::SToS64 } else { Ir::UToU64 };
+            let wide = t.emit.op(widen, &[reg]);
             let stride = t.emit.u64(u64::from(stride));
             let bytes = t.emit.op(Ir::IMul64, &[wide, stride]);
             let base = place.base.unwrap_or(bytes);
             place.base = Some(t.emit.op(Ir::IAdd64, &[base, bytes]));
         }
-        Index::Constant(_) => return malformed("the index is out of range"),
         Index::Dynamic { reg, .. } => {
             let stride = t.emit.u32(stride);
             let bytes = t.emit.op(Ir::IMul, &[reg, stride]);

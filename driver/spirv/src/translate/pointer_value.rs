@@ -10,7 +10,7 @@ use crate::instruction::Instruction;
 
 /// Translates `OpPtrEqual`, `OpPtrNotEqual` and `OpPtrDiff`.
 pub fn compare_pointers(t: &mut Translator, it: &Instruction) -> Result<()> {
-    let (a, b) = (t.regs(it.id(0)?)?, t.regs(it.id(1)?)?);
+    let (a, b) = (t.pointer_regs(it.id(0)?)?, t.pointer_regs(it.id(1)?)?);
     if a.len() != b.len() {
         return malformed("the pointers are of different storage classes");
     }
@@ -68,7 +68,9 @@ pub fn element_stride(t: &Translator, ty: u32) -> Result<u32> {
         let bytes = t.globals.types.tight_size(pointee)?;
         return Ok(u32::try_from(bytes).unwrap_or(u32::MAX).max(1));
     }
-    match t.module.literal(ty, Decoration::ArrayStride) {
+    // A pointer whose type has no stride points into an array whose type has one.
+    let stride = t.module.literal(ty, Decoration::ArrayStride);
+    match stride.or_else(|| t.globals.types.stride_of_arrays(pointee)) {
         Some(stride) => Ok(stride.max(1)),
         None => malformed("the pointer's type has no stride"),
     }

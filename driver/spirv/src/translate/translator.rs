@@ -121,6 +121,14 @@ impl Translator<'_> {
         }
     }
 
+    /// The registers of a pointer that is only compared, so that the layout of its target doesn't matter.
+    pub fn pointer_regs(&mut self, id: u32) -> Result<Rc<[Reg]>> {
+        match self.value(id)? {
+            Value::Pointer(pointer) => place_to_value(self, &pointer),
+            _ => self.regs(id),
+        }
+    }
+
     /// The register of a scalar.
     pub fn reg(&mut self, id: u32) -> Result<Reg> {
         match *self.regs(id)? {
@@ -195,14 +203,21 @@ impl Translator<'_> {
     }
 }
 
-/// The registers of a pointer.
+/// The registers of a pointer through which a value may be read.
 fn pointer_to_value(t: &mut Translator, pointer: &Pointer) -> Result<Rc<[Reg]>> {
+    if let Pointer::Memory(place) = pointer
+        && place.space != Space::Global
+    {
+        check_layout(t, place)?;
+    }
+    place_to_value(t, pointer)
+}
+
+/// The registers that say where a pointer points.
+fn place_to_value(t: &mut Translator, pointer: &Pointer) -> Result<Rc<[Reg]>> {
     let Pointer::Memory(place) = pointer else {
         return unsupported("this pointer as a value");
     };
-    if place.space != Space::Global {
-        check_layout(t, place)?;
-    }
     match place.space {
         Space::Global => Ok([address(t, place)?].into()),
         Space::Buffer(binding) => {

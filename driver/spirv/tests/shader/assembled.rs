@@ -251,6 +251,22 @@ fn pointers_are_chosen_at_run_time() {
     assert!(writable.eq([true; 4]));
 }
 
+/// Steps back by constants, distances of elements whose stride only the array's type has, and comparisons of pointers to
+/// matrices of two layouts.
+#[gaurast_runner::test]
+fn pointers_move_back() {
+    let source: Vec<u32> = (0..80).map(|index| 1000 + 7 * index).collect();
+    let results = run("pointers_back.comp", &[&buffer(&source)], 5 * LANES);
+    let row = |index: usize| &results[LANES * index..][..LANES];
+    for at in 0..LANES {
+        assert_eq!(row(0)[at], source[at + 2], "before the fourth, lane {at}");
+        assert_eq!(row(1)[at], source[at + 1], "kept, lane {at}");
+        assert_eq!(row(2)[at].cast_signed(), -2, "distance, lane {at}");
+        assert_eq!(row(3)[at], at as u32, "rows, lane {at}");
+        assert_eq!(row(4)[at], 2, "matrices, lane {at}");
+    }
+}
+
 /// Copies between layouts, choices of whole structs, narrowed constants, loop controls, copies with two memory operands,
 /// variables that nothing writes, and decorations by strings.
 #[gaurast_runner::test]
