@@ -87,7 +87,7 @@ fn depths(gpu: &Gpu, request: &Graphics<'_>, set: impl FnOnce(vk::CommandBuffer)
         commands.draw(0..3);
     });
     assert_eq!(gpu.message_texts(), Vec::<String>::new());
-    [0, 1].map(|picture: usize| output.pictures[picture].texels())
+    [0, 1].map(|picture: usize| output.pictures[picture].bytes.clone())
 }
 
 #[gaurast_runner::test]

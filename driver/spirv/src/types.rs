@@ -324,7 +324,10 @@ impl Types {
     /// The bytes between elements of a type in all arrays of them; None if these differ, or none has a stride.
     pub fn stride_of_arrays(&self, of: u32) -> Option<u32> {
         let mut strides = self.entries.values().filter_map(|entry| match entry.ty {
-            Type::Array { element, stride, .. } | Type::RuntimeArray { element, stride }
+            Type::Array {
+                element, stride, ..
+            }
+            | Type::RuntimeArray { element, stride }
                 if element == of =>
             {
                 stride

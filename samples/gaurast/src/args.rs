@@ -130,13 +130,8 @@ pub struct CameraArguments {
     )]
     pub eye: Option<Triple>,
 
-    /// The point that the camera looks at
-    #[arg(
-        long,
-        value_name = "X,Y,Z",
-        requires = "eye",
-        allow_hyphen_values = true
-    )]
+    /// The point that the camera looks at [default: the scene's middle]
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub target: Option<Triple>,
 
     /// The upward direction of the scene, which is also up in the picture [default: 0,-1,0]
@@ -153,7 +148,7 @@ pub struct CameraArguments {
     #[arg(long, value_name = "DEGREES", allow_hyphen_values = true, value_parser = elevation)]
     pub elevation: Option<f64>,
 
-    /// The camera's distance from the scene's middle, in the scene's units [default: the whole scene is in the picture]
+    /// The camera's distance from the target, in the scene's units [default: the whole scene is in the picture]
     #[arg(long, value_name = "D", value_parser = positive)]
     pub distance: Option<f64>,
 

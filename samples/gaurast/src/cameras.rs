@@ -252,7 +252,8 @@ fn by_hand(arguments: &CameraArguments, extent: &Extent, garden: bool) -> Result
     let framed = arguments.azimuth.is_some()
         || arguments.elevation.is_some()
         || arguments.distance.is_some()
-        || arguments.up.is_some();
+        || arguments.up.is_some()
+        || arguments.target.is_some();
     let mut said = None;
     let (camera, pivot) = match (arguments.eye, arguments.target) {
         (Some(eye), Some(target)) => {
@@ -277,15 +278,19 @@ fn by_hand(arguments: &CameraArguments, extent: &Extent, garden: bool) -> Result
                 up,
                 ..Framing::new(fov.unwrap_or(DEFAULT_FOV), size)
             };
-            let camera = framing.camera(extent)?;
+            let around = Extent {
+                centre: arguments.target.map_or(extent.centre, |target| target.0),
+                ..*extent
+            };
+            let camera = framing.camera(&around)?;
             let (azimuth, elevation) = default_angles();
             said = Some(format!(
                 "framed by --azimuth {:.1} --elevation {:.1} --distance {:.4}",
                 arguments.azimuth.unwrap_or(azimuth),
                 arguments.elevation.unwrap_or(elevation),
-                distance_ahead(&camera, extent.centre),
+                distance_ahead(&camera, around.centre),
             ));
-            (camera, extent.centre)
+            (camera, around.centre)
         }
     };
     let mut views = match arguments.orbit {

@@ -2,16 +2,11 @@
 
 use ash::vk;
 use gaurast::vk::{
-    GaussianAntialiasingGAURAST as Antialiasing, GaussianCameraGAURAST,
-    GaussianCameraModelGAURAST as Model, GaussianCutOffGAURAST as CutOff,
-    GaussianGeometryGAURAST as Geometry, GaussianLinearizationGAURAST as Linearization,
-    GaussianOrderGAURAST as Order, GaussianPrecisionGAURAST as Precision,
+    GaussianCameraGAURAST, GaussianCutOffGAURAST as CutOff,
     PipelineGaussianFootprintStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 use gaurast_oracle::oracle::{OracleDepthFormat, OracleInstance};
 use gaurast_oracle::scenes::{self, SceneBuffers};
-
-use crate::device::Device;
 
 /// The Gaussian state of a pipeline.
 pub type State = PipelineGaussianStateCreateInfoGAURAST<'static>;
@@ -280,141 +275,5 @@ impl Draw {
                 .height(height)
                 .max_depth(1.0)
         })
-    }
-
-    /// The first feature or limit that the draw needs and the device lacks.
-    pub fn missing(&self, device: &Device) -> Option<&'static str> {
-        let has = &device.features;
-        let state = &self.state;
-        let depth = self.depth.as_ref();
-        let any = self
-            .approximation
-            .is_some_and(|numbers| numbers != [0.0; 2]);
-        let footprint = self.footprint.unwrap_or_default();
-        let needs = [
-            (
-                state.order == Order::RADIAL_DISTANCE,
-                has.radial_distance_order,
-                "radialDistanceOrder",
-            ),
-            (
-                state.order == Order::PRIMITIVE,
-                has.primitive_order,
-                "primitiveOrder",
-            ),
-            (
-                state.order == Order::PER_PIXEL,
-                has.per_pixel_order,
-                "perPixelOrder",
-            ),
-            (
-                state.precision == Precision::FLOAT16,
-                has.rasterization_float16,
-                "rasterizationFloat16",
-            ),
-            (
-                state.antialiasing == Antialiasing::OPACITY_COMPENSATED,
-                has.opacity_compensation,
-                "opacityCompensation",
-            ),
-            (
-                self.camera.model == Model::ORTHOGRAPHIC,
-                has.orthographic_camera,
-                "orthographicCamera",
-            ),
-            (
-                self.camera.model == Model::FISHEYE,
-                has.fisheye_camera,
-                "fisheyeCamera",
-            ),
-            (
-                self.camera.model == Model::EQUIRECTANGULAR,
-                has.equirectangular_camera,
-                "equirectangularCamera",
-            ),
-            (
-                state.linearization == Linearization::UNSCENTED,
-                has.unscented_projection,
-                "unscentedProjection",
-            ),
-            (
-                state.geometry == Geometry::GAUSSIAN_2D,
-                has.gaussian_2d,
-                "gaussian2D",
-            ),
-            (
-                self.camera_in_buffer,
-                has.uniform_buffer_camera,
-                "uniformBufferCamera",
-            ),
-            (self.merged, has.merged_draws, "mergedDraws"),
-            (
-                self.instances.is_some(),
-                has.gaussian_instancing,
-                "gaussianInstancing",
-            ),
-            (
-                depth
-                    .is_some_and(|d| d.test.is_some() || d.bounds.is_some() || d.stencil.is_some()),
-                has.gaussian_depth_stencil,
-                "gaussianDepthStencil",
-            ),
-            (
-                self.samples > 1,
-                has.gaussian_multisample,
-                "gaussianMultisample",
-            ),
-            (any, has.gaussian_approximation, "gaussianApproximation"),
-            (
-                footprint.cut_off != CutOff::NONE,
-                has.gaussian_cut_off,
-                "gaussianCutOff",
-            ),
-            (
-                footprint.compensation_floor != 0.0,
-                has.opacity_compensation_floor,
-                "opacityCompensationFloor",
-            ),
-            (
-                self.shown.is_some(),
-                has.resolve_fragment_shader,
-                "resolveFragmentShader",
-            ),
-            (
-                self.shown.is_some(),
-                has.resolve_gaussian_indices,
-                "resolveGaussianIndices",
-            ),
-        ];
-        let lacks = needs
-            .iter()
-            .find(|(needed, offered, _)| *needed && *offered == vk::FALSE);
-        if let Some((_, _, name)) = lacks {
-            return Some(name);
-        }
-        if self.degree > device.properties.max_spherical_harmonics_degree {
-            return Some("maxSphericalHarmonicsDegree");
-        }
-        let counts = device.properties.gaussian_sample_counts;
-        if !counts.contains(vk::SampleCountFlags::from_raw(self.samples)) {
-            return Some("gaussianSampleCounts");
-        }
-        use vk::FormatFeatureFlags as F;
-        let copies = F::TRANSFER_SRC | F::TRANSFER_DST;
-        let color = F::COLOR_ATTACHMENT | F::COLOR_ATTACHMENT_BLEND | copies;
-        let has = |format, usage| device.gpu.format_features(format).contains(usage);
-        if !has(self.format.raw(), color) {
-            return Some("the colour attachment's format");
-        }
-        let tested = F::DEPTH_STENCIL_ATTACHMENT | copies;
-        if depth.is_some_and(|depth| !has(depth.format, tested)) {
-            return Some("the depth attachment's format");
-        }
-        if depth.is_some_and(|depth| depth.bounds.is_some())
-            && device.gpu.features().depth_bounds == vk::FALSE
-        {
-            return Some("depthBounds");
-        }
-        None
     }
 }

@@ -44,7 +44,15 @@ impl Layout {
             all.push((it.set, it.binding, it.count, ty));
         }
         let count: u32 = all.iter().map(|it| it.2).sum();
-        let fits = count as usize <= MOST_BINDINGS && all.iter().all(|it| it.0 < 4);
+        // No layout has two types of one binding.
+        let is_single = |at: usize| {
+            all[..at]
+                .iter()
+                .all(|it| (it.0, it.1) != (all[at].0, all[at].1))
+        };
+        let fits = count as usize <= MOST_BINDINGS
+            && all.iter().all(|it| it.0 < 4)
+            && (0..all.len()).all(is_single);
         fits.then_some(Self(all))
     }
 }

@@ -254,6 +254,12 @@ fn sides_distances_and_models() {
         (r / g - 1.0).abs() < 0.2,
         "both are seen from the side: {r} {g}"
     );
+    // From the side and near, only the target is in the picture.
+    let near = ["--azimuth", "90", "--distance", "1.5", "--target"];
+    let (_, [r, g, _]) = mean(&[&near[..], &["0,0,-1"]].concat());
+    assert!(r > 4.0 * g, "red is the target: {r} {g}");
+    let (_, [r, g, _]) = mean(&[&near[..], &["0,0,1"]].concat());
+    assert!(g > 4.0 * r, "green is the target: {r} {g}");
     let (plain, _) = mean(&[]);
     let (zoomed, _) = mean(&["--zoom", "0.5"]);
     let (far, _) = mean(&["--distance", "12"]);

@@ -2,12 +2,13 @@
 
 use super::super::footprint::Visible;
 use super::*;
-use crate::runtime::SimdLevel;
 use crate::state::Viewport;
 use crate::state::gaussian::{Camera, GaussianState};
 use crate::stats::optimizations::Optimizations;
+use crate::token_of;
 use devmem::dispatch;
 use fearless_simd::Level;
+use gaurast_runner::{Case, simd_levels};
 use proptest::prelude::*;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -153,7 +154,7 @@ fn contains(outer: &Spans, inner: &Spans) -> bool {
 /// if they are moved outwards by eight times its bound. Returns the numbers of tiles that are reached and that are found,
 /// and of Gaussians that were searched in binary64.
 fn assert_bounded(
-    (name, level): (&str, Level),
+    level: Level,
     view: &ViewConstants,
     gaussians: &[Flat],
     scratch: &mut Scratch,
@@ -174,12 +175,12 @@ fn assert_bounded(
         };
         assert!(
             contains(found, exact),
-            "{name}: {gaussian:?} reaches {exact:?}, found {found:?}"
+            "{gaussian:?} reaches {exact:?}, found {found:?}"
         );
         let is_sane = wider[at].extent.is_finite() && gaussian.extent >= 0.0;
         assert!(
             !is_sane || contains(wide, found),
-            "{name}: {gaussian:?} found {found:?}, and a wider one reaches {wide:?}"
+            "{gaussian:?} found {found:?}, and a wider one reaches {wide:?}"
         );
     }
     let count = |of: &[Spans]| {
@@ -237,8 +238,8 @@ fn random(rng: &mut ChaCha8Rng, visible: &Visible) -> Flat {
     flat
 }
 
-#[test]
-fn binary32_finds_every_tile_that_binary64_finds_and_hardly_more() {
+#[gaurast_runner::test(each = simd_levels())]
+fn binary32_finds_every_tile_that_binary64_finds_and_hardly_more(case: &Case) {
     let visible = |left, top, right, bottom| Visible {
         left,
         top,
@@ -259,29 +260,20 @@ fn binary32_finds_every_tile_that_binary64_finds_and_hardly_more() {
     };
     let mut rng = ChaCha8Rng::seed_from_u64(7);
     let mut scratch = Scratch::new();
-    for (name, level) in SimdLevel::supported() {
-        let level = level.resolve().unwrap();
-        let mut sums = [0; 3];
-        for group in 0..groups {
-            let view = &views[group % views.len()];
-            let gaussians: Vec<Flat> = (0..255).map(|_| random(&mut rng, &view.visible)).collect();
-            let counts = assert_bounded((name, level), view, &gaussians, &mut scratch);
-            for (sum, count) in sums.iter_mut().zip(counts) {
-                *sum += count;
-            }
+    let mut sums = [0; 3];
+    for group in 0..groups {
+        let view = &views[group % views.len()];
+        let gaussians: Vec<Flat> = (0..255).map(|_| random(&mut rng, &view.visible)).collect();
+        let counts = assert_bounded(token_of(case), view, &gaussians, &mut scratch);
+        for (sum, count) in sums.iter_mut().zip(counts) {
+            *sum += count;
         }
-        let [reached, found, wide] = sums;
-        assert!(
-            found - reached <= reached / 200,
-            "{name}: {found} of {reached}"
-        );
-        // Both ways are tested.
-        let all = 255 * groups as u64;
-        assert!(
-            wide > all / 100 && wide < all / 2,
-            "{name}: {wide} of {all}"
-        );
     }
+    let [reached, found, wide] = sums;
+    assert!(found - reached <= reached / 200, "{found} of {reached}");
+    // Both ways are tested.
+    let all = 255 * groups as u64;
+    assert!(wide > all / 100 && wide < all / 2, "{wide} of {all}");
 }
 
 /// Typical coordinates, those at edges of pixels and tiles, and invalid ones.
@@ -298,15 +290,16 @@ fn shape() -> impl Strategy<Value = [f64; 3]> {
     (0.05..12.0f64, 0.05..6.0f64, 0.0..3.2f64).prop_map(|(a, b, angle)| [a, b, angle])
 }
 
-proptest! {
-    #[test]
-    fn invalid_numbers_lose_no_tiles(
+#[gaurast_runner::test(each = simd_levels())]
+fn invalid_numbers_lose_no_tiles(case: &Case) {
+    let level = token_of(case);
+    proptest!(|(
         lanes in prop::collection::vec(
             ([place(), place()], shape(), prop_oneof![9 => 0.1..40.0f64, 1 => -1.0..0.0f64], 0.1..60.0f64),
             1..40,
         ),
         odd in (0..40usize, prop_oneof![Just(f64::NAN), Just(f64::INFINITY), Just(-1.0), Just(1e120)]),
-    ) {
+    )| {
         let view = projection(Visible { left: 3, top: 0, right: 200, bottom: 150 });
         let mut gaussians: Vec<Flat> = lanes
             .iter()
@@ -323,19 +316,18 @@ proptest! {
         }
         let mut scratch = Scratch::new();
         let (exact, expected) = tiles(None, &view, &gaussians, &mut scratch);
-        for (name, level) in SimdLevel::supported() {
-            let level = level.resolve().unwrap();
-            let (found, counters) = tiles(Some(level), &view, &gaussians, &mut scratch);
-            for ((gaussian, exact), found) in gaussians.iter().zip(&exact).zip(&found) {
-                prop_assert!(contains(found, exact), "{}: {:?} {:?} {:?}", name, gaussian, exact, found);
-            }
-            for counter in [Counter::SkippedNear, Counter::SkippedFar, Counter::SkippedDegenerate] {
-                prop_assert_eq!(counters.get(counter), expected.get(counter), "{}", name);
-            }
+        let (found, counters) = tiles(Some(level), &view, &gaussians, &mut scratch);
+        for ((gaussian, exact), found) in gaussians.iter().zip(&exact).zip(&found) {
+            prop_assert!(contains(found, exact), "{:?} {:?} {:?}", gaussian, exact, found);
         }
-    }
+        for counter in [Counter::SkippedNear, Counter::SkippedFar, Counter::SkippedDegenerate] {
+            prop_assert_eq!(counters.get(counter), expected.get(counter));
+        }
+    });
+}
 
-    #[test]
+proptest! {
+    #[gaurast_runner::test]
     fn depths_are_compared_as_they_are_rounded(bits in any::<u32>(), ulps in -3..3i32) {
         let value = f32::from_bits(bits);
         prop_assume!(!value.is_nan());
@@ -347,7 +339,7 @@ proptest! {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn the_last_number_before_infinity_is_known() {
     for value in [
         f32::MAX,
