@@ -208,7 +208,8 @@ fn random(rng: &mut ChaCha8Rng, visible: &Visible) -> Flat {
     let short = match rng.random_range(0..4) {
         // The least determinant that is searched in binary32, or hardly less or more.
         0 => {
-            f64::from(LEAST_VARIANCE).sqrt() / long * (1.0 + rng.random_range(-2..=2) as f64 * 1e-7)
+            f64::from(LEAST_VARIANCE).sqrt() / long
+                * (1.0 + f64::from(rng.random_range(-2..=2)) * 1e-7)
         }
         1 => long,
         _ => long * 2f64.powf(rng.random_range(-14.0..0.0)),
@@ -216,7 +217,7 @@ fn random(rng: &mut ChaCha8Rng, visible: &Visible) -> Flat {
     let angle = match rng.random_range(0..3) {
         0 => 0.0,
         1 => {
-            std::f64::consts::FRAC_PI_2 * rng.random_range(0..4) as f64
+            std::f64::consts::FRAC_PI_2 * f64::from(rng.random_range(0..4))
                 + rng.random_range(-1e-4..1e-4)
         }
         _ => rng.random_range(0.0..3.2),
@@ -228,7 +229,7 @@ fn random(rng: &mut ChaCha8Rng, visible: &Visible) -> Flat {
     let mut flat = Flat::new(mean, [long, short, angle], extent);
     // One of many has about the greatest size.
     if rng.random_range(0..512) == 0 {
-        let size = f64::from(MOST_SIZE) * (1.0 + rng.random_range(-2..=2) as f64 * 1e-7);
+        let size = f64::from(MOST_SIZE) * (1.0 + f64::from(rng.random_range(-2..=2)) * 1e-7);
         let rest = size - mean[0].abs() - mean[1].abs();
         let [a, _, c] = flat.covariance;
         let by = (rest / ((a * extent.abs()).sqrt() + (c * extent.abs()).sqrt())).powi(2);
