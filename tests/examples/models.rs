@@ -33,7 +33,7 @@ const FRAGMENT: &str = "
 fn target(gpu: &Gpu, size: [u32; 2]) -> Target {
     let options = TargetOptions {
         size,
-        ..TargetOptions::with_depth(vk::Format::R8G8B8A8_UNORM)
+        ..TargetOptions::with_depth(vk::Format::D32_SFLOAT)
     };
     Target::new(gpu, &options)
 }
