@@ -48,7 +48,7 @@ fn draw_mesh(gpu: &Gpu, name: &str, model: &Model) -> Outcome<()> {
     let target = target(gpu, SIZE);
     let ready = Ready::new(gpu, &target, model, Vec3::new(0.4, 0.3, 1.0));
     gpu.run(|commands| {
-        let pass = Pass::clear([0.1, 0.2, 0.3, 1.0]);
+        let pass = Pass::clear([0.2, 0.4, 0.6, 1.0]);
         commands.pass(&target, &pass, || ready.draw(commands));
     });
     write(&target, SIZE, name)
@@ -83,7 +83,7 @@ fn draw_floor(gpu: &Gpu, frame: u32) -> Outcome<()> {
         .collect();
     let vertices = Buffer::of(gpu, &vertices);
     gpu.run(|commands| {
-        commands.pass(&target, &Pass::clear([0.1, 0.2, 0.3, 1.0]), || {
+        commands.pass(&target, &Pass::clear([0.2, 0.4, 0.6, 1.0]), || {
             commands.bind(&pipeline);
             commands.vertices(&vertices);
             commands.draw(0..6);
