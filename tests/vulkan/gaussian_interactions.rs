@@ -251,7 +251,7 @@ fn sample_shading_changes_nothing_without_a_fragment_stage() {
     assert!(resolved(true) == plain);
 }
 
-/// What makes a fragment of its own, or sends vertices elsewhere, is not there: no pipeline has both.
+/// Extensions that make fragments of their own or send vertices elsewhere are absent, so that no pipeline has them.
 #[gaurast_runner::test]
 fn neither_transform_feedback_nor_shading_rates_are_offered() {
     let gpu = open();

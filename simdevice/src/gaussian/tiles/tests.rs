@@ -23,7 +23,7 @@ struct Flat {
     /// The covariance.
     covariance: [f64; 3],
     determinant: f64,
-    /// Where it is cut off.
+    /// The cut-off of the quadratic form.
     extent: f64,
     depth: f64,
 }
