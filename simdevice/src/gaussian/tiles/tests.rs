@@ -29,6 +29,21 @@ struct Flat {
 }
 
 impl Flat {
+    /// True if the ellipse contains a visible pixel centre of a tile.
+    fn reaches_a_centre(&self, visible: &Visible, (row, column): (u32, u16)) -> bool {
+        let ([x, y], [a, b, c]) = (self.mean, self.covariance);
+        let pixels = |tile: i64, first: i64, end: i64| {
+            let (first, end) = (first.max(16 * tile), end.min(16 * tile + 16));
+            (first..end).map(|pixel| pixel as f64 + 0.5)
+        };
+        pixels(row.into(), visible.top, visible.bottom).any(|below| {
+            pixels(column.into(), visible.left, visible.right).any(|right| {
+                let [dx, dy] = [right - x, below - y];
+                c * dx * dx - 2.0 * b * dx * dy + a * dy * dy <= self.extent * self.determinant
+            })
+        })
+    }
+
     /// A Gaussian with standard deviations `p` and `q` along an axis at `angle` and across it.
     fn new(mean: [f64; 2], [p, q, angle]: [f64; 3], extent: f64) -> Self {
         let (sin, cos) = angle.sin_cos();
@@ -150,6 +165,16 @@ fn contains(outer: &Spans, inner: &Spans) -> bool {
     })
 }
 
+/// True if an ellipse is known to reach the tiles that the reference finds: it does not test one whose box is in one tile.
+fn is_reached(gaussian: &Flat, view: &ViewConstants, exact: &Spans) -> bool {
+    match exact[..] {
+        [(row, first, end)] if end - first == 1 => {
+            gaussian.reaches_a_centre(&view.visible, (row, first))
+        }
+        _ => true,
+    }
+}
+
 /// Asserts that the search in binary32 finds all tiles that Gaussians reach at a level, and none that they do not reach
 /// if they are moved outwards by eight times its bound. Returns the numbers of tiles that are reached and that are found,
 /// and of Gaussians that were searched in binary64.
@@ -173,8 +198,9 @@ fn assert_bounded(
             [(_, first, end)] if end - first == 1 => &wider[at].boxed(&view.visible),
             _ => &wide[at],
         };
+        let is_reached = is_reached(gaussian, view, exact);
         assert!(
-            contains(found, exact),
+            !is_reached || contains(found, exact),
             "{gaussian:?} reaches {exact:?}, found {found:?}"
         );
         let is_sane = wider[at].extent.is_finite() && gaussian.extent >= 0.0;
@@ -319,7 +345,8 @@ fn invalid_numbers_lose_no_tiles(case: &Case) {
         let (exact, expected) = tiles(None, &view, &gaussians, &mut scratch);
         let (found, counters) = tiles(Some(level), &view, &gaussians, &mut scratch);
         for ((gaussian, exact), found) in gaussians.iter().zip(&exact).zip(&found) {
-            prop_assert!(contains(found, exact), "{:?} {:?} {:?}", gaussian, exact, found);
+            let is_reached = is_reached(gaussian, &view, exact);
+            prop_assert!(!is_reached || contains(found, exact), "{:?} {:?} {:?}", gaussian, exact, found);
         }
         for counter in [Counter::SkippedNear, Counter::SkippedFar, Counter::SkippedDegenerate] {
             prop_assert_eq!(counters.get(counter), expected.get(counter));
