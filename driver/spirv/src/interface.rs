@@ -193,8 +193,10 @@ pub struct ShaderBinding {
     pub binding: u32,
     /// The kind of its descriptors.
     pub kind: DescriptorKind,
-    /// The array's length, or 1.
+    /// The array's length, or 1. Of an array without a length, the greatest that the options permit.
     pub count: u32,
+    /// True if the array has no length, so that the layout decides how many descriptors there are.
+    pub is_unsized: bool,
     /// The program's resource slot of the first descriptor; the others follow. Resource slots are unique over all
     /// kinds; a combined image sampler uses the same slot for both.
     pub slot: u32,

@@ -140,7 +140,7 @@ impl PipelineLayout {
                 wanted.kind
             ));
         }
-        (wanted.count > given.count).then(|| {
+        (wanted.count > given.count && !wanted.is_unsized).then(|| {
             format!(
                 "{place} has {} descriptors in the pipeline layout; the {stage} shader wants {}",
                 given.count, wanted.count

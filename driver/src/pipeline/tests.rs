@@ -11,15 +11,20 @@ use std::sync::Arc;
 
 /// The interface of a checked-in shader of the shader compiler's tests.
 fn interface(name: &str, stage: Stage) -> Interface {
+    translated(name, stage, &Options::default())
+}
+
+/// The interface of a shader that is translated with these options.
+fn translated(name: &str, stage: Stage, options: &Options) -> Interface {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("spirv/tests/shaders");
     let bytes = std::fs::read(folder.join(format!("{name}.spv"))).unwrap();
     let words: Vec<u32> = bytes
         .chunks_exact(4)
         .map(|word| u32::from_le_bytes(word.try_into().unwrap()))
         .collect();
-    let (specialization, options) = (Specialization::default(), Options::default());
+    let specialization = Specialization::default();
     let module = Module::parse(&words).unwrap();
-    let shader = translate(&module, "main", stage, &specialization, &options).unwrap();
+    let shader = translate(&module, "main", stage, &specialization, options).unwrap();
     shader.interface
 }
 
@@ -75,6 +80,32 @@ fn disagreements_with_the_layout_are_told() {
             "the compute shader uses set 1, binding 3 (\"buffers\"), which the pipeline layout doesn't have",
         ]
     );
+}
+
+#[test]
+fn arrays_without_a_length_take_what_the_layout_has() {
+    let options = Options {
+        unsized_descriptors: 5,
+        ..Options::default()
+    };
+    let found = translated("unsized_descriptors.comp", Stage::Compute, &options);
+    let storage = vk::DescriptorType::STORAGE_BUFFER;
+    for count in [1, 7] {
+        let sources = binding(0, storage, count);
+        let layout = PipelineLayout::new(
+            vec![Some(Arc::new(
+                DescriptorSetLayout::new(
+                    vec![sources, binding(1, storage, 1)],
+                    vk::DescriptorSetLayoutCreateFlags::empty(),
+                )
+                .unwrap(),
+            ))],
+            &[],
+            0,
+        )
+        .unwrap();
+        assert_eq!(layout.mismatches(&found), [""; 0]);
+    }
 }
 
 #[test]

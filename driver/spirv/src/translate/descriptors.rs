@@ -21,6 +21,10 @@ pub fn descriptor(t: &mut Translator, id: u32, variable: GlobalVariable) -> Resu
         Some(end) if end <= MAX_DESCRIPTORS => t.next_resource_slot = end,
         _ => return unsupported("too many descriptors"),
     }
+    let is_unsized = matches!(
+        t.globals.types.get(variable.pointee)?,
+        Type::RuntimeArray { .. }
+    );
     let mut ty = variable.pointee;
     while let Type::Array { .. } | Type::RuntimeArray { .. } = t.globals.types.get(ty)? {
         ty = descriptors(t, ty)?.0;
@@ -43,6 +47,7 @@ pub fn descriptor(t: &mut Translator, id: u32, variable: GlobalVariable) -> Resu
         binding,
         kind,
         count,
+        is_unsized,
         slot,
         size,
         writable: false,

@@ -395,13 +395,13 @@ fn descriptor_arrays_without_a_length_need_their_capability() {
         gaurast_spirv::translate(&module, "main", stage, &specialization, &options)
     };
     let shader = attempt(&words).unwrap();
-    let counts: Vec<u32> = shader
+    let counts: Vec<(u32, bool)> = shader
         .interface
         .descriptors
         .iter()
-        .map(|it| it.count)
+        .map(|it| (it.count, it.is_unsized))
         .collect();
-    assert_eq!(counts, [5, 1]);
+    assert_eq!(counts, [(5, true), (1, false)]);
     let lacking = without(&words, spirv::Capability::RuntimeDescriptorArray);
     assert_ne!(lacking, words);
     let refused = attempt(&lacking).unwrap_err().to_string();

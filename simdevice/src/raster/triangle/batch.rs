@@ -9,7 +9,6 @@ use crate::program::fragment::{BATCH_LANES, Interface};
 use crate::program::interface::{FragmentInput, Interpolation, Sampling};
 use crate::raster::tile_buffer::QuadAddresses;
 use crate::simd::{bits_of, both, spread, three};
-use crate::stats::optimizations::{Optimization, Optimizations};
 use fearless_simd::{Simd, f32x16, prelude::*};
 use isa::Vector;
 use isa::machine::{LaneMask, Machine};
@@ -75,10 +74,6 @@ pub struct Batch {
     side: u32,
     /// True if some pixels of quads are not covered.
     partial: bool,
-    /// True if batches are tested for being affine.
-    detects_affine: bool,
-    /// True if 1 / w is constant in each primitive, so that barycentrics need no perspective correction.
-    affine: bool,
     pub quads: [Quad; QUADS],
     pub count: usize,
     /// A bit for each tile: 1 if the batch has quads of it.
@@ -105,8 +100,6 @@ impl Default for Batch {
             corner: [0; 2],
             side: 1,
             partial: false,
-            detects_affine: true,
-            affine: true,
             quads: [Quad::default(); QUADS],
             count: 0,
             tiles: 0,
@@ -128,7 +121,7 @@ impl Default for Batch {
 pub struct BlockValues<S: Simd> {
     pub barycentrics: [f32x16<S>; 2],
     pub depth: f32x16<S>,
-    /// The value of 1 / w. If it is constant in the primitive, it is 1 here, and the unit is in the set-up.
+    /// The value of 1 / w, in units of the set-up's `scale`: 1 if it is constant in the primitive.
     pub inverse_w: f32x16<S>,
 }
 
@@ -166,7 +159,7 @@ impl<S: Simd> BlockValues<S> {
                 add(bases[1] as f32, setup.lane_barycentrics[1]),
             ];
         }
-        if needs.inverse_w && !setup.affine {
+        if needs.inverse_w {
             self.inverse_w = add(setup.inverse_w(bases), setup.lane_w);
         }
     }
@@ -187,9 +180,8 @@ impl<S: Simd> BlockValues<S> {
 impl Batch {
     /// Empties the batch for a draw whose fragments have these needs, in the macro-tile at column and row `at`, of
     /// `size` x `size` pixels.
-    pub fn begin(&mut self, needs: Needs, at: [u32; 2], size: u32, optimizations: Optimizations) {
+    pub fn begin(&mut self, needs: Needs, at: [u32; 2], size: u32) {
         self.needs = needs;
-        self.detects_affine = optimizations.has(Optimization::Affine);
         self.corner = at.map(|at| at * size);
         self.side = size / TILE_SIZE;
         self.clear();
@@ -197,7 +189,7 @@ impl Batch {
 
     /// Removes all quads and records.
     pub fn clear(&mut self) {
-        (self.affine, self.partial) = (self.detects_affine, false);
+        self.partial = false;
         (self.count, self.tiles) = (0, 0);
         self.records.clear();
         self.attributes.clear();
@@ -211,7 +203,6 @@ impl Batch {
         interface: &Interface,
         varyings: &Varyings,
     ) -> u16 {
-        self.affine &= setup.affine;
         self.records.push(Record {
             id: primitive.id,
             layer: primitive.layer,
@@ -456,7 +447,7 @@ impl Batch {
         ]
     }
 
-    /// Sets a program's inputs. Returns true if perspective-correct varyings needed no division.
+    /// Sets a program's inputs.
     #[inline(always)]
     pub fn set_inputs<S: Simd>(
         &mut self,
@@ -464,13 +455,12 @@ impl Batch {
         interface: &Interface,
         samples: Samples,
         machine: &mut Machine,
-    ) -> bool {
+    ) {
         let perspective = interface
             .varyings
             .iter()
             .any(|(_, interpolation)| *interpolation == Interpolation::Perspective);
-        let divided = perspective && !self.affine;
-        if divided {
+        if perspective {
             self.divide(simd);
         }
         let at_centers = samples.positions.len() == 1 || samples.each_shaded;
@@ -487,7 +477,7 @@ impl Batch {
                     && (at_centers || sampling != Sampling::Centroid) =>
                 {
                     let barycentrics = match interpolation {
-                        Interpolation::Perspective if divided => &self.perspective,
+                        Interpolation::Perspective => &self.perspective,
                         _ => &self.barycentrics,
                     };
                     self.interpolate(simd, place, interface.varyings.len(), barycentrics, lanes);
@@ -500,7 +490,6 @@ impl Batch {
                 }
             }
         }
-        perspective && !divided
     }
 
     /// Interpolates a varying for all chunks of `out`.

@@ -79,12 +79,9 @@ pub fn render(
         quads_masked: 0,
         work: record.map(|_| MacroTileWork::default()),
     };
-    renderer.batch.begin(
-        draw.needs,
-        macro_tile.at,
-        macro_tile.size,
-        draw.optimizations,
-    );
+    renderer
+        .batch
+        .begin(draw.needs, macro_tile.at, macro_tile.size);
     let level = draw.level;
     let deferred = &mut *scratch.deferred;
     deferred.clear();
@@ -547,10 +544,7 @@ impl Renderer<'_, '_> {
         let machine = machines.of_size(size);
         let batch = &mut *self.batch;
         batch.prepare();
-        let affine = dispatch!(level, simd => batch.set_inputs(
-            simd, &stage.interface, draw.samples, machine
-        ));
-        self.counters.add(Counter::BatchesAffine, affine.into());
+        dispatch!(level, simd => batch.set_inputs(simd, &stage.interface, draw.samples, machine));
         let watchdog = Watchdog {
             limit: draw.limit,
             cancel: Some(self.cancel),
@@ -830,14 +824,8 @@ impl Renderer<'_, '_> {
         full.attributes.clear();
         let (primitive, varyings) = (current.primitive, current.varyings);
         add_attributes(primitive, interface, varyings, &mut full.attributes);
-        let affine = current.setup.affine && draw.optimizations.has(Optimization::Affine);
-        let divides = draw.needs.inverse_w && !affine;
         if draw.needs.barycentrics {
-            let needs = Needs {
-                inverse_w: divides,
-                ..draw.needs
-            };
-            full.find_barycentrics(simd, current.setup, tile.corner, needs);
+            full.find_barycentrics(simd, current.setup, tile.corner, draw.needs);
         }
         let Some(machines) = self.machines.as_mut() else {
             return Ok(());
@@ -847,11 +835,9 @@ impl Renderer<'_, '_> {
             if let FragmentInput::Varying { interpolation, .. } = kind {
                 let attribute = full.attributes[place];
                 let lanes = machine.input_mut(slot);
-                full.interpolate(simd, interpolation, divides, attribute, lanes);
+                full.interpolate(simd, interpolation, attribute, lanes);
             }
         }
-        let undivided = draw.needs.inverse_w && !divides;
-        self.counters.add(Counter::BatchesAffine, undivided.into());
         let watchdog = Watchdog {
             limit: draw.limit,
             cancel: Some(self.cancel),

@@ -56,8 +56,6 @@ pub struct TriangleSetup {
     pub w_slopes: [f32; 2],
     /// The values of 1 / w at corners 1 and 2, in units of `scale`.
     pub weights: [f32; 2],
-    /// True if 1 / w is the same at all corners.
-    pub affine: bool,
     /// The unit of 1 / w: its value if it is the same at all corners, so that no digits are lost; otherwise 1.
     pub scale: f32,
 }
@@ -194,9 +192,9 @@ impl TriangleSetup {
         let along = |axis: usize| (d1 * slopes[0][axis] + d2 * slopes[1][axis]) as f32;
         let depth_slopes = [along(0), along(1)];
         let [iw0, iw1, iw2] = primitive.inverse_w;
-        let affine = iw0 == iw1 && iw0 == iw2;
-        let scale = if affine { iw0 } else { 1.0 };
-        let weights = if affine { [1.0; 3] } else { [iw0, iw1, iw2] };
+        let is_constant = iw0 == iw1 && iw0 == iw2;
+        let scale = if is_constant { iw0 } else { 1.0 };
+        let weights = if is_constant { [1.0; 3] } else { [iw0, iw1, iw2] };
         let inverse_w = three(weights, f64::from);
         let (d1, d2) = (inverse_w[1] - inverse_w[0], inverse_w[2] - inverse_w[0]);
         let along = |axis: usize| (d1 * slopes[0][axis] + d2 * slopes[1][axis]) as f32;
@@ -219,12 +217,11 @@ impl TriangleSetup {
         }
         self.depth_slopes = depth_slopes;
         self.inverse_w = inverse_w;
-        if needs.inverse_w && !affine {
+        if needs.inverse_w {
             self.lane_w = lanes(w_slopes);
         }
         self.w_slopes = w_slopes;
         self.weights = [weights[1], weights[2]];
-        self.affine = affine;
         self.scale = scale;
         true
     }
