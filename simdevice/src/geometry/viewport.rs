@@ -129,28 +129,19 @@ impl Transform {
     }
 
     /// Divides by w and maps to the viewport. Each coordinate is rounded after the division, and once more after a
-    /// fused multiplication and addition. Snapped coordinates beside the view volume are rounded only once, since
-    /// binary32 has fewer digits than 1/256 pixels need there.
+    /// fused multiplication and addition.
     #[inline(always)]
     pub(super) fn project(&self, [x, y, z, w]: [f32; 4]) -> WindowVertex {
         let inverse_w = 1.0 / w;
-        let exact_inverse_w = 1.0 / f64::from(w);
-        let map = |ndc: f64, axis: usize| {
-            ndc * f64::from(self.scale[axis]) + f64::from(self.translate[axis])
+        let map = |ndc: f32, axis: usize| {
+            let (scale, translate) = (self.scale[axis], self.translate[axis]);
+            (f64::from(ndc) * f64::from(scale) + f64::from(translate)) as f32
         };
-        let rounded = |at: f32, axis: usize| map(f64::from(at * inverse_w), axis) as f32;
-        let window = [rounded(x, 0), rounded(y, 1)];
-        let snapped = |at: f32, axis: usize| {
-            if at.abs() <= w.abs() {
-                snap(window[axis])
-            } else {
-                snap_precisely(map(f64::from(at) * exact_inverse_w, axis))
-            }
-        };
+        let window = [map(x * inverse_w, 0), map(y * inverse_w, 1)];
         WindowVertex {
             window,
-            snapped: [snapped(x, 0), snapped(y, 1)],
-            depth: rounded(z, 2),
+            snapped: [snap(window[0]), snap(window[1])],
+            depth: map(z * inverse_w, 2),
             inverse_w,
         }
     }
@@ -197,18 +188,7 @@ const FARTHEST: f64 = 16_777_216.0;
 /// Snaps a window coordinate to 1/256 pixels: the distance from the centre of pixel 0 is rounded, ties to even.
 #[inline(always)]
 pub(super) fn snap(window: f32) -> i32 {
-    round(f64::from((window - 0.5) * ONE as f32))
-}
-
-/// Snaps a window coordinate as [`snap`] does.
-#[inline(always)]
-fn snap_precisely(window: f64) -> i32 {
-    round((window - 0.5) * f64::from(ONE))
-}
-
-/// The sub-pixel position that a distance from the centre of pixel 0, in 1/256 pixels, is rounded to.
-#[inline(always)]
-fn round(scaled: f64) -> i32 {
+    let scaled = f64::from((window - 0.5) * ONE as f32);
     #[expect(
         clippy::manual_clamp,
         reason = "it would leave what is no number as it is"
