@@ -90,6 +90,9 @@ impl QueryType {
             Self::Performance(counters) if counters.iter().any(is_simulated) => {
                 QueryKind::Simulated
             }
+            Self::Words(counters) if counters.contains(&Some(Counter::FragmentInvocations)) => {
+                QueryKind::Fragments
+            }
             Self::Performance(_) | Self::Words(_) => QueryKind::Performance,
         }
     }

@@ -89,9 +89,12 @@ impl Subpass {
         self.attachments().contains(&index)
     }
 
-    /// Reports whether it renders to attachment number `index`, or resolves to it.
+    /// Reports whether it renders to attachment number `index`, or resolves to it. A resolve of one aspect leaves the
+    /// other as the attachment's load operation makes it.
     fn writes(&self, index: usize) -> bool {
-        let resolved = self.depth_stencil_resolve.map(|resolve| resolve.attachment);
+        let resolve = self.depth_stencil_resolve;
+        let whole = resolve.filter(|it| it.depth.is_some() && it.stencil.is_some());
+        let resolved = whole.map(|resolve| resolve.attachment);
         let lists = [&self.color, &self.resolve];
         lists.iter().any(|list| list.contains(&Some(index)))
             || [self.depth_stencil, resolved].contains(&Some(index))

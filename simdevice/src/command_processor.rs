@@ -68,6 +68,8 @@ pub struct CommandProcessor {
     pass: Option<Pass>,
     /// The set of Gaussians that was begun and has not ended, once for each view.
     gaussians: Vec<GaussianSet>,
+    /// The number of active queries of fragments.
+    fragment_queries: u32,
     model: HardwareModel,
 }
 
@@ -82,6 +84,7 @@ impl CommandProcessor {
             counters: Counters::default(),
             pass: None,
             gaussians: Vec::new(),
+            fragment_queries: 0,
             model: HardwareModel::new(owner),
         }
     }
@@ -96,10 +99,11 @@ impl CommandProcessor {
         self.pass.is_some()
     }
 
-    /// Drops a render pass and a set of Gaussians that were begun and not ended. Draws that were not flushed are lost.
+    /// Drops a render pass, a set of Gaussians and queries that were begun and not ended. Draws that were not flushed are lost.
     pub fn reset(&mut self) {
         self.pass = None;
         self.gaussians.clear();
+        self.fragment_queries = 0;
     }
 
     /// Executes one packet.
@@ -206,6 +210,9 @@ impl CommandProcessor {
                     self.model
                         .begin(self.device.runtime(), &mut self.counters, area);
                 }
+                if pool.kind() == QueryKind::Fragments {
+                    self.fragment_queries += 1;
+                }
                 pool.begin(*index, &self.counters);
                 Ok(())
             }
@@ -215,6 +222,9 @@ impl CommandProcessor {
                     let area = self.pass.as_ref().map(Pass::area);
                     self.model
                         .end(self.device.runtime(), &mut self.counters, area);
+                }
+                if pool.kind() == QueryKind::Fragments {
+                    self.fragment_queries = self.fragment_queries.saturating_sub(1);
                 }
                 pool.end(*index, &self.counters);
                 // In a pass with views, the first query has the result for all views; the queries of the other views
@@ -326,6 +336,7 @@ impl CommandProcessor {
                 recording::add_front_end(record, &self.counters.since(before), draw, &part);
             }
             part.record = record.clone();
+            part.counts_fragments = self.fragment_queries > 0;
             self.draw(PassDraw::Primitives(Box::new(part)))?;
             before = recorder.map(|_| self.counters.clone());
         }

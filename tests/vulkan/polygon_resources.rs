@@ -126,15 +126,16 @@ fn queries_count_samples_and_invocations() {
         device.reset_query_pool(occlusion, 0, 1);
         device.reset_query_pool(counted, 0, 1);
     }
-    let mut vertices = everything(RED).to_vec();
-    // The triangle is behind the eye.
+    // The second triangle hides the first, whose fragments count all the same.
+    let mut vertices = [everything(RED), everything(BLUE)].concat();
+    // The third is behind the eye.
     vertices.extend(everything(GREEN).map(|[x, y, z, _, r, g, b, a]| [x, y, z, -1.0, r, g, b, a]));
     canvas.draw(&colored(), &vertices, |device, commands, _| {
         // SAFETY: see the crate.
         unsafe {
             device.cmd_begin_query(commands, occlusion, 0, vk::QueryControlFlags::PRECISE);
             device.cmd_begin_query(commands, counted, 0, vk::QueryControlFlags::empty());
-            device.cmd_draw(commands, 6, 1, 0, 0);
+            device.cmd_draw(commands, 9, 1, 0, 0);
             device.cmd_end_query(commands, counted, 0);
             device.cmd_end_query(commands, occlusion, 0);
             device.cmd_draw(commands, 3, 1, 0, 0);
@@ -154,8 +155,8 @@ fn queries_count_samples_and_invocations() {
         device.destroy_query_pool(occlusion, None);
         device.destroy_query_pool(counted, None);
     }
-    assert_eq!(samples, [PIXELS as u32]);
-    assert_eq!(statistics, [[6, 2, 6, 2, PIXELS as u64, 0]]);
+    assert_eq!(samples, [2 * PIXELS as u32]);
+    assert_eq!(statistics, [[9, 3, 9, 3, 2 * PIXELS as u64, 0]]);
 }
 
 #[gaurast_runner::test]

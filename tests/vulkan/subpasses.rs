@@ -298,10 +298,19 @@ fn samples_are_resolved_and_read_one_by_one() {
 
 #[gaurast_runner::test]
 fn depth_and_stencil_are_resolved() {
+    use vk::ResolveModeFlags as Mode;
     let gpu = open();
+    check_resolve(&gpu, [Mode::MIN, Mode::SAMPLE_ZERO], (0.375, 9));
+    // What is not resolved has its load operation all the same.
+    check_resolve(&gpu, [Mode::NONE, Mode::SAMPLE_ZERO], (1.0, 9));
+    check_resolve(&gpu, [Mode::MIN, Mode::NONE], (0.375, 1));
+}
+
+/// Clears samples to 0.375 and 9, and what they are resolved to by these modes of depth and stencil to 1 and 1.
+fn check_resolve(gpu: &Gpu, modes: [vk::ResolveModeFlags; 2], expected: (f32, u8)) {
     let format = vk::Format::D32_SFLOAT_S8_UINT;
     let (one, four) = (vk::SampleCountFlags::TYPE_1, vk::SampleCountFlags::TYPE_4);
-    let images = [image(&gpu, format, four), image(&gpu, format, one)];
+    let images = [image(gpu, format, four), image(gpu, format, one)];
     let attachments = [four, one].map(|samples| {
         vk::AttachmentDescription2::default()
             .format(format)
@@ -320,8 +329,8 @@ fn depth_and_stencil_are_resolved() {
             .aspect_mask(both)
     });
     let mut resolve = vk::SubpassDescriptionDepthStencilResolve::default()
-        .depth_resolve_mode(vk::ResolveModeFlags::MIN)
-        .stencil_resolve_mode(vk::ResolveModeFlags::SAMPLE_ZERO)
+        .depth_resolve_mode(modes[0])
+        .stencil_resolve_mode(modes[1])
         .depth_stencil_resolve_attachment(&single);
     let subpasses = [vk::SubpassDescription2::default()
         .depth_stencil_attachment(&many)
@@ -331,7 +340,7 @@ fn depth_and_stencil_are_resolved() {
         .subpasses(&subpasses);
     let views = [&images[0], &images[1]].map(|image| image.attachment);
     let texels = u64::from(WIDTH * HEIGHT);
-    let buffers = [4, 1].map(|size| Buffer::new(&gpu, texels * size));
+    let buffers = [4, 1].map(|size| Buffer::new(gpu, texels * size));
     // SAFETY: see the crate.
     unsafe {
         let pass = gpu.device().create_render_pass2(&info, None).unwrap();
@@ -370,16 +379,9 @@ fn depth_and_stencil_are_resolved() {
         gpu.device().destroy_framebuffer(framebuffer, None);
         gpu.device().destroy_render_pass(pass, None);
     }
-    assert!(
-        buffers[0]
-            .values::<f32>()
-            .iter()
-            .all(|&depth| depth == 0.375)
-    );
-    assert!(
-        buffers[1]
-            .values::<u8>()
-            .iter()
-            .all(|&stencil| stencil == 9)
-    );
+    let depths = buffers[0].values::<f32>();
+    let stencils = buffers[1].values::<u8>();
+    let of_depth = depths.iter().all(|&depth| depth == expected.0);
+    let of_stencil = stencils.iter().all(|&stencil| stencil == expected.1);
+    assert!(of_depth && of_stencil, "{modes:?}");
 }

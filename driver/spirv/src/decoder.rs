@@ -174,7 +174,8 @@ impl Decoder<'_> {
         }
     }
 
-    /// Decodes a string of UTF-8, up to the word with its zero byte.
+    /// Decodes a string of UTF-8, up to the word with its zero byte. What is not UTF-8 becomes U+FFFD, since names have
+    /// no meaning.
     fn string(&mut self) -> Result<(), Error> {
         let mut bytes = Vec::new();
         loop {
@@ -185,10 +186,8 @@ impl Decoder<'_> {
                 break;
             }
         }
-        match String::from_utf8(bytes) {
-            Ok(string) => self.it.operands.push(Operand::String(string)),
-            Err(error) => return self.invalid(error.utf8_error()),
-        }
+        let string = String::from_utf8_lossy(&bytes).into_owned();
+        self.it.operands.push(Operand::String(string));
         Ok(())
     }
 
@@ -281,6 +280,12 @@ mod tests {
         ] {
             assert_eq!(found, format!("not SPIR-V: {expected}"));
         }
-        assert!(refused(name, &[1, 0x00ff]).contains("invalid utf-8"));
+    }
+
+    #[test]
+    fn names_need_not_be_utf_8() {
+        let all = decoded(&[(Op::Name as u32, &[1, 0x0041_ff41])]).unwrap();
+        let name = Operand::String("A\u{fffd}A".to_owned());
+        assert_eq!(all[0].operands, [Operand::Id(1), name]);
     }
 }

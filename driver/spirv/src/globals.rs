@@ -54,6 +54,8 @@ pub(crate) struct Constant {
 /// A variable outside functions.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct GlobalVariable {
+    /// The type of pointers to it.
+    pub ty: u32,
     pub class: StorageClass,
     pub pointee: u32,
     pub initializer: Option<u32>,
@@ -115,9 +117,11 @@ impl Globals {
         it: &Instruction,
     ) -> Result<()> {
         if it.opcode == Op::Variable {
-            let (class, pointee) = self.types.pointer(it.ty()?)?;
+            let ty = it.ty()?;
+            let (class, pointee) = self.types.pointer(ty)?;
             let initializer = it.id(1).ok();
             let variable = GlobalVariable {
+                ty,
                 class,
                 pointee,
                 initializer,

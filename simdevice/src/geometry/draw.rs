@@ -23,6 +23,8 @@ pub struct PrimitiveDraw {
     /// The pixels that they may touch, by viewport: the pass's area, cut to the scissor and the viewport. Primitives
     /// may extend beyond them.
     pub regions: Vec<Rect>,
+    /// True if a query counts its fragments, so that hidden ones are shaded too.
+    pub(crate) counts_fragments: bool,
     /// The record to which the work of its tiles is added, if there is a recorder.
     pub(crate) record: Option<Arc<DrawRecord>>,
 }
@@ -53,6 +55,7 @@ impl PrimitiveDraw {
             bindings: draw.fragment_bindings.clone(),
             segments: Vec::new(),
             regions: Vec::new(),
+            counts_fragments: false,
             record: None,
         }
     }

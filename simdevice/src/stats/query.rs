@@ -16,6 +16,8 @@ pub fn host_time() -> u64 {
 pub enum QueryKind {
     /// The device's counters, except those that need a model of the hardware.
     Performance,
+    /// As [`QueryKind::Performance`], while all fragments are shaded that early tests leave, hidden ones too.
+    Fragments,
     /// All of the device's counters.
     Simulated,
     /// The host's monotonic time in nanoseconds.

@@ -7,7 +7,7 @@ use super::cube;
 use super::lod;
 use super::sampler::{AddressMode, BorderColor, Filter, Reduction, Sampler};
 use super::surface::{Surface, Texel};
-use crate::format::{Channel, Numeric};
+use crate::format::{Channel, MAX_TEXEL_SIZE, Numeric};
 use isa::combine;
 use isa::ir::{AtomicOp, Dimension, Format as Word, ImageShape, VECTOR_LANES};
 use isa::resources::{LaneWords, SampleRequest, TexelRequest};
@@ -338,48 +338,95 @@ fn lanes(request: &TexelRequest) -> impl Iterator<Item = usize> {
     (0..VECTOR_LANES).filter(move |lane| mask >> lane & 1 != 0)
 }
 
-/// Reads texels.
+/// Reads texels. Those of the active lanes are decoded together.
 pub(super) fn read(surface: &Surface, request: &TexelRequest) -> [LaneWords; 4] {
     let mut out = [[0; VECTOR_LANES]; 4];
-    for lane in lanes(request) {
-        let texel = place(request.shape, request, lane);
-        let texel = surface.texel(request.level[lane] as usize, texel);
-        let texel = texel.unwrap_or_else(|| surface.outside());
+    let mut put = |lane: usize, texel: [u32; 4]| {
         for (out, component) in out.iter_mut().zip(surface.swizzled(texel)) {
             out[lane] = component;
         }
+    };
+    let size = surface.texel_size;
+    let mut bytes = [0; VECTOR_LANES * MAX_TEXEL_SIZE];
+    let mut read = [0; VECTOR_LANES];
+    let mut count = 0;
+    for lane in lanes(request) {
+        let texel = place(request.shape, request, lane);
+        let offset = surface.offset(request.level[lane] as usize, texel);
+        let into = &mut bytes[size * count..][..size];
+        match offset.and_then(|offset| load(surface, offset, into)) {
+            Some(()) => {
+                read[count] = lane;
+                count += 1;
+            }
+            None => put(lane, surface.outside()),
+        }
+    }
+    let mut texels = [[0.0; 4]; VECTOR_LANES];
+    surface
+        .format
+        .decode_row(&bytes[..size * count], &mut texels);
+    for (lane, texel) in read[..count].iter().zip(texels) {
+        put(*lane, texel.map(f32::to_bits));
     }
     out
 }
 
-/// Writes texels. Nothing is written to a surface that is not writable.
+/// Writes texels, which are encoded together. Nothing is written to a surface that is not writable.
 pub(super) fn write(surface: &Surface, request: &TexelRequest, texel: &[LaneWords; 4]) {
     if !surface.writable {
         return;
     }
+    let mut offsets = [0; VECTOR_LANES];
+    let mut texels = [[0.0; 4]; VECTOR_LANES];
+    let mut count = 0;
     for lane in lanes(request) {
-        let Some(offset) = surface.offset(0, place(request.shape, request, lane)) else {
-            continue;
-        };
-        let registers = texel.map(|lanes| f32::from_bits(lanes[lane]));
-        store(surface, offset, &surface.format.encode(registers));
+        if let Some(offset) = surface.offset(0, place(request.shape, request, lane)) {
+            offsets[count] = offset;
+            texels[count] = texel.map(|lanes| f32::from_bits(lanes[lane]));
+            count += 1;
+        }
+    }
+    let size = surface.texel_size;
+    let mut bytes = [0; VECTOR_LANES * MAX_TEXEL_SIZE];
+    surface
+        .format
+        .encode_row(&texels[..count], &mut bytes[..size * count]);
+    for (offset, bytes) in offsets[..count].iter().zip(bytes.chunks_exact(size)) {
+        store(surface, *offset, bytes);
     }
 }
 
-/// Stores a texel's bytes. A texel of at most 8 bytes, if their number is a power of two, is stored atomically.
-fn store(surface: &Surface, offset: u64, bytes: &[u8; 16]) {
+/// Loads a texel's bytes; `None` if they are not all in memory.
+fn load(surface: &Surface, offset: u64, into: &mut [u8]) -> Option<()> {
     let memory = &surface.memory;
-    let [a, b, c, d, e, f, g, h, ..] = *bytes;
-    let stored = match surface.texel_size {
-        1 => memory.store_u8(offset, a),
-        2 => memory.store_u16(offset, u16::from_le_bytes([a, b])),
-        4 => memory.store_u32(offset, u32::from_le_bytes([a, b, c, d])),
-        8 => memory.store_u64(offset, u64::from_le_bytes([a, b, c, d, e, f, g, h])),
+    match into.len() {
+        4 if offset.is_multiple_of(4) => {
+            into.copy_from_slice(&memory.load_u32(offset)?.to_le_bytes());
+        }
+        8 if offset.is_multiple_of(8) => {
+            into.copy_from_slice(&memory.load_u64(offset)?.to_le_bytes());
+        }
+        _ => memory.read(offset, into).ok()?,
+    }
+    Some(())
+}
+
+/// Stores a texel's bytes. A texel of at most 8 bytes, if their number is a power of two, is stored atomically.
+fn store(surface: &Surface, offset: u64, bytes: &[u8]) {
+    let memory = &surface.memory;
+    let stored = match *bytes {
+        [a] => memory.store_u8(offset, a),
+        [a, b] => memory.store_u16(offset, u16::from_le_bytes([a, b])),
+        [a, b, c, d] => memory.store_u32(offset, u32::from_le_bytes([a, b, c, d])),
+        [a, b, c, d, e, f, g, h] => {
+            memory.store_u64(offset, u64::from_le_bytes([a, b, c, d, e, f, g, h]))
+        }
         _ => None,
     };
     if stored.is_none() {
         // The offset lies in the surface, so that this cannot fail.
-        let _ = memory.write(offset, &bytes[..surface.texel_size]);
+        let _ = memory.write(offset, bytes);
     }
 }
 

@@ -132,6 +132,7 @@ impl Resources {
         let images = (0..4).filter_map(|_| image(bytes)).collect();
         let kind = bytes.one(&[
             QueryKind::Performance,
+            QueryKind::Fragments,
             QueryKind::Timestamp,
             QueryKind::Simulated,
         ]);

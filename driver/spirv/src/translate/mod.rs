@@ -35,7 +35,9 @@ mod variables;
 use std::collections::HashMap;
 
 use isa::ir::MAX_LANES;
-use spirv::{AddressingModel, BuiltIn, Capability, ExecutionMode, ExecutionModel, MemoryModel};
+use spirv::{
+    AddressingModel, BuiltIn, Capability, ExecutionMode, ExecutionModel, MemoryModel, StorageClass,
+};
 
 use crate::error::{Diagnostic, Error, Result, malformed, unsupported};
 use crate::globals::{Globals, Specialization};
@@ -94,13 +96,21 @@ fn translate_here(
 ) -> Result<Shader, Error> {
     check_capabilities(module)?;
     let globals = Globals::new(module, specialization)?;
-    let entry = find_entry(module, name, stage)?;
+    let declaration = find_entry(module, name, stage)?;
+    let entry = declaration.id(1).map_err(|_| no_entry(name, stage))?;
     let function = module
         .functions
         .get(&entry)
         .copied()
         .ok_or_else(|| no_entry(name, stage))?;
-    let analysis = Analysis::new(module, &globals, function)?;
+    let mut analysis = Analysis::new(module, &globals, function)?;
+    // An output with an initializer is written although no code names it.
+    analysis
+        .used
+        .extend(declaration.ids(3).into_iter().filter(|id| {
+            let variable = globals.variables.get(id);
+            variable.is_some_and(|it| it.class == StorageClass::Output && it.initializer.is_some())
+        }));
     let interface = execution_modes(module, &globals, entry, stage)?;
     let translator = Translator {
         module,
@@ -236,8 +246,8 @@ fn no_entry(name: &str, stage: Stage) -> Error {
     }
 }
 
-/// The function of an entry point.
-fn find_entry(module: &Module, name: &str, stage: Stage) -> Result<u32, Error> {
+/// The declaration of an entry point.
+fn find_entry<'a>(module: &'a Module, name: &str, stage: Stage) -> Result<&'a Instruction, Error> {
     let model = match stage {
         Stage::Vertex => ExecutionModel::Vertex,
         Stage::Fragment => ExecutionModel::Fragment,
@@ -248,7 +258,6 @@ fn find_entry(module: &Module, name: &str, stage: Stage) -> Result<u32, Error> {
         .find(|it| {
             it.enumerant(0, ExecutionModel::from_u32) == Some(model) && it.string(2) == Some(name)
         })
-        .and_then(|it| it.id(1).ok())
         .ok_or_else(|| no_entry(name, stage))
 }
 

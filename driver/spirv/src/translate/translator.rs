@@ -41,8 +41,11 @@ pub struct Translator<'a> {
 impl Translator<'_> {
     /// The type of an id.
     pub fn type_of(&self, id: u32) -> Result<u32> {
-        let constant = || self.globals.constants.get(&id).map(|constant| constant.ty);
-        match self.types.get(&id).copied().or_else(constant) {
+        let globals = self.globals;
+        let constant = || globals.constants.get(&id).map(|constant| constant.ty);
+        let variable = || globals.variables.get(&id).map(|variable| variable.ty);
+        let known = self.types.get(&id).copied();
+        match known.or_else(constant).or_else(variable) {
             Some(ty) => Ok(ty),
             None => malformed(format!("%{id} has no type here")),
         }

@@ -163,3 +163,11 @@ fn a_sample_that_is_named_asks_for_a_run_for_each() {
     let other = translated("colored.frag", &Specialization::default());
     assert!(!other.interface.per_sample);
 }
+
+#[gaurast_runner::test]
+fn initialized_outputs_are_written_though_no_code_names_them() {
+    let shader = translated("initialized_outputs.frag", &Specialization::default());
+    let outputs = run(&shader, |source, _| panic!("{source:?}"));
+    let values = outputs.iter().map(|lanes| lanes.map(|output| output[0]));
+    assert!(values.eq([[0.5; LANES], [0.25; LANES]]), "{outputs:?}");
+}

@@ -124,7 +124,9 @@ impl<'a> TriangleTileDraw<'a> {
         let path = match interface {
             _ if effects.tests_late => Path::LateTests,
             Some(interface) if takes_whole_tiles => {
-                whole_tile_path(interface, &colors, optimizations)
+                let hides = optimizations.has(Optimization::OverwrittenQuads);
+                let hides = hides && !draw.counts_fragments;
+                whole_tile_path(interface, &colors, hides)
             }
             _ => Path::EarlyTests,
         };
@@ -204,14 +206,10 @@ impl ShadingEffects {
     }
 }
 
-/// The path of a draw that may process whole tiles at once.
-fn whole_tile_path(
-    interface: &Interface,
-    colors: &[Option<ColorOutput>],
-    optimizations: Optimizations,
-) -> Path {
+/// The path of a draw that may process whole tiles at once. Hidden surfaces are left out only if `may_hide`.
+fn whole_tile_path(interface: &Interface, colors: &[Option<ColorOutput>], may_hide: bool) -> Path {
     let batches_tiles = interface.takes_varyings_alone();
-    let removes_hidden_surfaces = optimizations.has(Optimization::OverwrittenQuads)
+    let removes_hidden_surfaces = may_hide
         && !interface.has_side_effects
         && colors.iter().flatten().all(ColorOutput::overwrites);
     if removes_hidden_surfaces {

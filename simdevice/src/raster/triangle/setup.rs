@@ -194,7 +194,11 @@ impl TriangleSetup {
         let [iw0, iw1, iw2] = primitive.inverse_w;
         let is_constant = iw0 == iw1 && iw0 == iw2;
         let scale = if is_constant { iw0 } else { 1.0 };
-        let weights = if is_constant { [1.0; 3] } else { [iw0, iw1, iw2] };
+        let weights = if is_constant {
+            [1.0; 3]
+        } else {
+            [iw0, iw1, iw2]
+        };
         let inverse_w = three(weights, f64::from);
         let (d1, d2) = (inverse_w[1] - inverse_w[0], inverse_w[2] - inverse_w[0]);
         let along = |axis: usize| (d1 * slopes[0][axis] + d2 * slopes[1][axis]) as f32;

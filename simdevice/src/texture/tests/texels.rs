@@ -126,6 +126,57 @@ fn what_is_written_is_read_back() {
     }
 }
 
+/// Lanes are decoded and encoded together; each must read and write what it does alone.
+#[gaurast_runner::test]
+fn lanes_together_do_as_each_alone() {
+    let mut checked = 0;
+    for &format in Format::ALL {
+        if !format.aspects().contains(&Aspect::Color) || format.decompressed().is_some() {
+            continue;
+        }
+        checked += 1;
+        let desc = desc(ImageKind::D2, format, [5, 4, 1]);
+        let [together, alone] = [(); 2].map(|()| {
+            storage(image(desc, |_, _, [x, y, _]| {
+                [x as f32 / 4.0, y as f32 / 3.0, 0.3, 0.7]
+            }))
+        });
+        // Some lanes are outside, and some are not active.
+        let at: Vec<[u32; 4]> = (0..16).map(|lane| [lane % 6, lane / 3, 0, 0]).collect();
+        let request = TexelRequest {
+            mask: 0b1101_1110_1011_0111,
+            ..texels(shape(Dimension::D2), &at)
+        };
+        let of_lane = |lane: usize| TexelRequest {
+            mask: request.mask & 1 << lane,
+            ..request
+        };
+        let read_alone = |table: &ImageTable| {
+            let mut out = [[0; 16]; 4];
+            for lane in 0..16 {
+                let found = table.read(0, &of_lane(lane));
+                for component in 0..4 {
+                    out[component][lane] = found[component][lane];
+                }
+            }
+            out
+        };
+        assert_eq!(together.read(0, &request), read_alone(&alone), "{format:?}");
+        let values = [3, 7, 11, 13].map(|factor| {
+            std::array::from_fn(|lane| match format.is_integer() {
+                true => (factor * lane * 4) as u32,
+                false => (factor * lane) as f32 / 100.0,
+            })
+        });
+        together.write(0, &request, &values);
+        for lane in 0..16 {
+            alone.write(0, &of_lane(lane), &values);
+        }
+        assert_eq!(read_alone(&together), read_alone(&alone), "{format:?}");
+    }
+    assert!(checked > 50, "{checked}");
+}
+
 #[gaurast_runner::test]
 fn writes_outside_vanish() {
     let image = image(

@@ -190,6 +190,7 @@ fn draw(
             primitives,
             varyings: Varyings { values, per_vertex },
         }],
+        counts_fragments: false,
         record: None,
     }
 }
