@@ -7,6 +7,7 @@
 //! [`simdevice`] packets. It never computes a pixel.
 
 mod abi;
+mod calibrated_timestamps;
 mod command;
 mod convert;
 mod descriptor;

@@ -133,3 +133,72 @@ fn clip_space_begins_at_minus_w_where_the_pipeline_says_so() {
         assert_eq!(depth_in_viewport(&gpu, true, z), from_minus_one, "{z}");
     }
 }
+
+/// The depth that is stored for a fragment whose shader writes a depth, in a viewport with these depths.
+fn stored_depth(gpu: &Gpu, clamp: bool, written: f32, viewport_depths: [f32; 2]) -> f32 {
+    let target = Target::new(
+        gpu,
+        &TargetOptions {
+            size: [4, 4],
+            ..TargetOptions::with_depth(vk::Format::D32_SFLOAT)
+        },
+    );
+    let options = PipelineOptions {
+        vertex: "layout(location = 0) in vec4 position;
+                 layout(location = 1) in vec4 color;
+                 layout(location = 0) flat out float depth;
+                 void main() { gl_Position = position; depth = color.x; }",
+        fragment: Some(
+            "layout(location = 0) flat in float depth;
+             layout(location = 0) out vec4 color;
+             void main() { color = vec4(1); gl_FragDepth = depth; }",
+        ),
+        raster: vk::PipelineRasterizationStateCreateInfo::default()
+            .line_width(1.0)
+            .depth_clamp_enable(clamp),
+        depth_stencil: vk::PipelineDepthStencilStateCreateInfo::default()
+            .depth_test_enable(true)
+            .depth_write_enable(true)
+            .depth_compare_op(vk::CompareOp::ALWAYS),
+        ..PipelineOptions::default()
+    };
+    let pipeline = Pipeline::new(gpu, &target, &options);
+    let vertex = |x: f32, y: f32| Vertex {
+        position: [x, y, 0.5, 1.0],
+        color: [written, 0.0, 0.0, 0.0],
+    };
+    let vertices = Buffer::of(
+        gpu,
+        &[vertex(-1.0, -1.0), vertex(3.0, -1.0), vertex(-1.0, 3.0)],
+    );
+    gpu.run(|commands| {
+        commands.pass(&target, &Pass::default(), || {
+            commands.bind(&pipeline);
+            commands.viewport([0.0, 0.0, 4.0, 4.0], viewport_depths);
+            commands.vertices(&vertices);
+            commands.draw(0..3);
+        });
+    });
+    let depth = target.depth.as_ref().expect("it has depth");
+    let found: Vec<f32> = bytemuck::pod_collect_to_vec(&depth.read(vk::ImageAspectFlags::DEPTH, 4));
+    assert!(found.iter().all(|depth| depth == &found[0]), "{found:?}");
+    found[0]
+}
+
+#[gaurast_runner::test(needs = [GLSLANG])]
+fn depths_are_clamped_to_zero_and_one() {
+    let mut features =
+        vk::PhysicalDeviceDepthClampZeroOneFeaturesEXT::default().depth_clamp_zero_one(true);
+    let gpu =
+        Gpu::extended(&[ash::ext::depth_clamp_zero_one::NAME], &mut features).expect("a device");
+    for (written, unclamped, clamped) in [
+        (-0.5, 0.0, 0.25),
+        (0.125, 0.125, 0.25),
+        (0.5, 0.5, 0.5),
+        (0.875, 0.875, 0.75),
+        (1.5, 1.0, 0.75),
+    ] {
+        assert_eq!(stored_depth(&gpu, false, written, [0.0, 1.0]), unclamped);
+        assert_eq!(stored_depth(&gpu, true, written, [0.75, 0.25]), clamped);
+    }
+}

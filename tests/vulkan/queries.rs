@@ -145,6 +145,60 @@ fn timestamps_ascend_and_are_copied_with_their_availability() {
     }
 }
 
+/// The device's clock is that of timestamps, and it runs as fast as the host's.
+#[gaurast_runner::test]
+fn clocks_are_read_together() {
+    let gpu = open();
+    let instance = ash::ext::calibrated_timestamps::Instance::new(gpu.entry(), gpu.instance());
+    let clocks = ash::ext::calibrated_timestamps::Device::new(gpu.instance(), gpu.device());
+    // SAFETY: see the crate.
+    let domains = unsafe {
+        instance
+            .get_physical_device_calibrateable_time_domains(gpu.physical_device())
+            .unwrap()
+    };
+    let host = [
+        vk::TimeDomainKHR::CLOCK_MONOTONIC,
+        vk::TimeDomainKHR::CLOCK_MONOTONIC_RAW,
+    ];
+    assert_eq!(domains, [vk::TimeDomainKHR::DEVICE, host[0], host[1]]);
+    let read = || {
+        let of = |domain| vk::CalibratedTimestampInfoKHR::default().time_domain(domain);
+        let infos: Vec<_> = domains.iter().copied().map(of).collect();
+        // SAFETY: see the crate.
+        unsafe { clocks.get_calibrated_timestamps(&infos).unwrap() }
+    };
+    let info = vk::QueryPoolCreateInfo::default()
+        .query_type(vk::QueryType::TIMESTAMP)
+        .query_count(1);
+    let (before, deviation_before) = read();
+    let mut written = [0u64; 1];
+    // SAFETY: see the crate.
+    unsafe {
+        let device = gpu.device();
+        let pool = device.create_query_pool(&info, None).unwrap();
+        device.reset_query_pool(pool, 0, 1);
+        gpu.run(|recording| {
+            let (device, commands) = recording.raw();
+            let stage = vk::PipelineStageFlags::BOTTOM_OF_PIPE;
+            device.cmd_write_timestamp(commands, stage, pool, 0);
+        });
+        let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
+        device
+            .get_query_pool_results(pool, 0, &mut written, flags)
+            .unwrap();
+        device.destroy_query_pool(pool, None);
+    }
+    let (after, deviation_after) = read();
+    assert!((before[0]..=after[0]).contains(&written[0]));
+    let passed = [0, 1].map(|clock: usize| after[clock] - before[clock]);
+    assert!(passed[0].abs_diff(passed[1]) <= deviation_before + deviation_after);
+    let windows = vk::CalibratedTimestampInfoKHR::default()
+        .time_domain(vk::TimeDomainKHR::QUERY_PERFORMANCE_COUNTER);
+    // SAFETY: see the crate.
+    unsafe { assert!(clocks.get_calibrated_timestamps(&[windows]).is_err()) };
+}
+
 /// Breaks VUID-VkQueryPoolCreateInfo-queryType-03222 and
 /// VUID-VkQueryPoolPerformanceCreateInfoKHR-pCounterIndices-03321.
 #[gaurast_runner::test]

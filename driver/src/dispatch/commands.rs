@@ -262,6 +262,12 @@ static ROWS: &[Command] = rows! {
         vkCmdSetDepthBiasEnable: vk::PFN_vkCmdSetDepthBiasEnable = vkCmdSetDepthBiasEnable;
         vkCmdSetPrimitiveRestartEnable: vk::PFN_vkCmdSetPrimitiveRestartEnable = vkCmdSetPrimitiveRestartEnable;
     }
+    PhysicalDevice, DeviceExtension(&[c"VK_EXT_calibrated_timestamps"]) => {
+        vkGetPhysicalDeviceCalibrateableTimeDomainsEXT: vk::PFN_vkGetPhysicalDeviceCalibrateableTimeDomainsKHR = vkGetPhysicalDeviceCalibrateableTimeDomainsEXT;
+    }
+    Device, DeviceExtension(&[c"VK_EXT_calibrated_timestamps"]) => {
+        vkGetCalibratedTimestampsEXT: vk::PFN_vkGetCalibratedTimestampsKHR = vkGetCalibratedTimestampsEXT;
+    }
     Device, DeviceExtension(&[c"VK_EXT_color_write_enable"]) => {
         vkCmdSetColorWriteEnableEXT: vk::PFN_vkCmdSetColorWriteEnableEXT = vkCmdSetColorWriteEnableEXT;
     }
@@ -4445,6 +4451,49 @@ unsafe extern "system" fn vkCmdSetPrimitiveRestartEnable(
                     )
                 },
             )
+        }
+    })
+}
+
+unsafe extern "system" fn vkGetPhysicalDeviceCalibrateableTimeDomainsEXT(
+    physical_device: vk::PhysicalDevice,
+    p_time_domain_count: *mut u32,
+    p_time_domains: *mut vk::TimeDomainKHR,
+) -> vk::Result {
+    guard(
+        physical_device,
+        "vkGetPhysicalDeviceCalibrateableTimeDomainsEXT",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                valid::enumerate(
+                    p_time_domain_count,
+                    p_time_domains,
+                    &crate::calibrated_timestamps::get_physical_device_calibrateable_time_domains(
+                    )?,
+                )
+            }
+        },
+    )
+}
+
+unsafe extern "system" fn vkGetCalibratedTimestampsEXT(
+    device: vk::Device,
+    timestamp_count: u32,
+    p_timestamp_infos: *const vk::CalibratedTimestampInfoKHR<'_>,
+    p_timestamps: *mut u64,
+    p_max_deviation: *mut u64,
+) -> vk::Result {
+    guard(device, "vkGetCalibratedTimestampsEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::calibrated_timestamps::get_calibrated_timestamps(
+                handle::get(device)?,
+                valid::slice(p_timestamp_infos, timestamp_count)?,
+                p_timestamps,
+                p_max_deviation,
+            )
+            .map(|()| vk::Result::SUCCESS)
         }
     })
 }

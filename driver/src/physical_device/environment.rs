@@ -9,9 +9,8 @@
 //! - `GAURAST_TRACE`: a file to which the work of a device's last 64 render passes is written, as JSON, when the device
 //!   is destroyed; `gaurast simulate` reads it. It costs a little time and changes no image.
 //! - `GAURAST_TIMESTAMPS`: the clock of timestamps: host (the default) or simulated, which counts the nanoseconds that
-//!   the paper's hardware would have spent since the device was created. Vulkan has no time domain for such a clock
-//!   (`VK_KHR_calibrated_timestamps` knows the device's and the host's), so that no application requests it by
-//!   accident.
+//!   the paper's hardware would have spent since the device was created. Such a clock is no time domain of
+//!   `VK_EXT_calibrated_timestamps`, which then has the host's alone.
 //! - `GAURAST_DUMP`: the text that is printed to standard error, by name: ir (the device's programs, when pipelines are
 //!   created).
 
@@ -47,14 +46,21 @@ pub(crate) fn open_device() -> Result<simdevice::Device, Error> {
         variable(TIMEOUT)?.as_deref(),
         variable(OPTIMIZATIONS)?.as_deref(),
     )?;
-    config.simulated_timestamps =
-        simulated_timestamps(variable(TIMESTAMPS)?.as_deref().unwrap_or_default())?;
+    config.simulated_timestamps = has_simulated_timestamps()?;
     if let Some(file) = variable(TRACE)?.filter(|file| !file.is_empty()) {
         let file = PathBuf::from(file);
         let recorder = Recorder::new(move |trace| write_trace(&file, &trace));
         config.recorder = Some(Arc::new(recorder));
     }
     simdevice::Device::new(&config).map_err(|error| Error::InitializationFailed(error.to_string()))
+}
+
+/// Reports whether timestamps of devices that are created now count the simulated hardware's time.
+///
+/// # Errors
+/// [`Error::InitializationFailed`] for a value that is invalid.
+pub(crate) fn has_simulated_timestamps() -> Result<bool, Error> {
+    simulated_timestamps(variable(TIMESTAMPS)?.as_deref().unwrap_or_default())
 }
 
 /// Reports whether timestamps count the simulated hardware's time.

@@ -286,6 +286,8 @@ pub(crate) struct Features {
     pub(crate) custom_border_colors: bool,
     /// `customBorderColorWithoutFormat`.
     pub(crate) custom_border_color_without_format: bool,
+    /// `depthClampZeroOne`.
+    pub(crate) depth_clamp_zero_one: bool,
     /// `depthClipControl`.
     pub(crate) depth_clip_control: bool,
     /// `depthClipEnable`.
@@ -632,6 +634,7 @@ pub(crate) const SUPPORTED: Features = Features {
     inherited_conditional_rendering: true,
     custom_border_colors: true,
     custom_border_color_without_format: true,
+    depth_clamp_zero_one: true,
     depth_clip_control: true,
     depth_clip_enable: true,
     extended_dynamic_state: true,
@@ -850,6 +853,7 @@ impl Features {
         inherited_conditional_rendering: false,
         custom_border_colors: false,
         custom_border_color_without_format: false,
+        depth_clamp_zero_one: false,
         depth_clip_control: false,
         depth_clip_enable: false,
         extended_dynamic_state: false,
@@ -968,7 +972,7 @@ impl Features {
     };
 
     /// The features by their names.
-    pub(crate) fn list(&self) -> [(&'static str, bool); 253] {
+    pub(crate) fn list(&self) -> [(&'static str, bool); 254] {
         [
             ("robustBufferAccess", self.robust_buffer_access),
             ("fullDrawIndexUint32", self.full_draw_index_uint32),
@@ -1273,6 +1277,7 @@ impl Features {
                 "customBorderColorWithoutFormat",
                 self.custom_border_color_without_format,
             ),
+            ("depthClampZeroOne", self.depth_clamp_zero_one),
             ("depthClipControl", self.depth_clip_control),
             ("depthClipEnable", self.depth_clip_enable),
             ("extendedDynamicState", self.extended_dynamic_state),
@@ -2069,6 +2074,9 @@ impl Features {
             out.custom_border_colors = self.custom_border_colors.into();
             out.custom_border_color_without_format = self.custom_border_color_without_format.into();
         }
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceDepthClampZeroOneFeaturesEXT<'_>>() {
+            out.depth_clamp_zero_one = self.depth_clamp_zero_one.into();
+        }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceDepthClipControlFeaturesEXT<'_>>() {
             out.depth_clip_control = self.depth_clip_control.into();
         }
@@ -2682,6 +2690,11 @@ impl Features {
                 requested.custom_border_color_without_format != vk::FALSE;
         }
         if let Some(requested) =
+            valid::cast::<vk::PhysicalDeviceDepthClampZeroOneFeaturesEXT<'_>>(structure)
+        {
+            self.depth_clamp_zero_one |= requested.depth_clamp_zero_one != vk::FALSE;
+        }
+        if let Some(requested) =
             valid::cast::<vk::PhysicalDeviceDepthClipControlFeaturesEXT<'_>>(structure)
         {
             self.depth_clip_control |= requested.depth_clip_control != vk::FALSE;
@@ -2967,6 +2980,9 @@ pub(crate) fn extension_of(structure: vk::StructureType) -> Option<&'static CStr
         }
         vk::PhysicalDeviceCustomBorderColorFeaturesEXT::STRUCTURE_TYPE => {
             Some(c"VK_EXT_custom_border_color")
+        }
+        vk::PhysicalDeviceDepthClampZeroOneFeaturesEXT::STRUCTURE_TYPE => {
+            Some(c"VK_EXT_depth_clamp_zero_one")
         }
         vk::PhysicalDeviceDepthClipControlFeaturesEXT::STRUCTURE_TYPE => {
             Some(c"VK_EXT_depth_clip_control")

@@ -88,6 +88,7 @@ pub const EXTENSIONS: [&CStr; 6] = [
     ash::khr::map_memory2::NAME,
     ash::khr::performance_query::NAME,
     ash::khr::push_descriptor::NAME,
+    ash::ext::calibrated_timestamps::NAME,
     ash::ext::index_type_uint8::NAME,
     ash::ext::provoking_vertex::NAME,
     ash::ext::vertex_attribute_divisor::NAME,

@@ -105,12 +105,11 @@ fn translate_here(
         .ok_or_else(|| no_entry(name, stage))?;
     let mut analysis = Analysis::new(module, &globals, function)?;
     // An output with an initializer is written although no code names it.
-    analysis
-        .used
-        .extend(declaration.ids(3).into_iter().filter(|id| {
-            let variable = globals.variables.get(id);
-            variable.is_some_and(|it| it.class == StorageClass::Output && it.initializer.is_some())
-        }));
+    let named = declaration.ids(3);
+    analysis.used.extend(named.iter().filter(|id| {
+        let variable = globals.variables.get(id);
+        variable.is_some_and(|it| it.class == StorageClass::Output && it.initializer.is_some())
+    }));
     let interface = execution_modes(module, &globals, entry, stage)?;
     let translator = Translator {
         module,
@@ -134,7 +133,7 @@ fn translate_here(
     };
     let mut control_flow = ControlFlow::new(translator);
     control_flow.run(function)?;
-    finish(control_flow.t)
+    finish(control_flow.t, &named)
 }
 
 /// The interface of an entry point with its execution modes, still without inputs and outputs.
@@ -211,9 +210,10 @@ fn execution_mode(globals: &Globals, it: &Instruction, interface: &mut Interface
     Ok(())
 }
 
-fn finish(mut t: Translator) -> Result<Shader, Error> {
+/// The translated shader of an entry point whose declaration names these variables.
+fn finish(mut t: Translator, named: &[u32]) -> Result<Shader, Error> {
     variables::declare_push_constants(&mut t);
-    t.interface.per_sample = t.io.per_sample || variables::names_a_sample(&t);
+    t.interface.per_sample = t.io.per_sample || variables::has_an_input_of_samples(&t, named);
     t.interface.inputs = t.io.inputs;
     t.interface.outputs = t.io.outputs;
     Ok(Shader {

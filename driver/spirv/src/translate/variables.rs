@@ -205,13 +205,12 @@ fn compute_inputs(t: &mut Translator, id: u32) -> Result<()> {
     Ok(())
 }
 
-/// Reports whether code names an input that differs between samples. Such an input requires a run for each sample, even
-/// if the code never runs.
-pub fn names_a_sample(t: &Translator) -> bool {
+/// Reports whether an entry point's interface, by its ids, has an input that differs between samples. Such an input
+/// requires a run for each sample, even if no code reads it.
+pub fn has_an_input_of_samples(t: &Translator, interface: &[u32]) -> bool {
     let is_of_sample =
         |built_in| matches!(built_in, Some(BuiltIn::SampleId | BuiltIn::SamplePosition));
-    let mut used = t.analysis.used.iter();
-    used.any(|id| {
+    interface.iter().any(|id| {
         let Some(variable) = t.globals.variables.get(id) else {
             return false;
         };

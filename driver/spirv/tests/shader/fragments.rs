@@ -160,6 +160,8 @@ fn a_sample_that_is_named_asks_for_a_run_for_each() {
     let shader = translated("never_per_sample.frag", &Specialization::default());
     assert!(shader.interface.inputs.is_empty());
     assert!(shader.interface.per_sample);
+    let unread = translated("unread_position.frag", &Specialization::default());
+    assert!(unread.interface.per_sample);
     let other = translated("colored.frag", &Specialization::default());
     assert!(!other.interface.per_sample);
 }

@@ -126,6 +126,26 @@ fn what_is_written_is_read_back() {
     }
 }
 
+/// The same access of one lane.
+fn of_lane(request: &TexelRequest, lane: usize) -> TexelRequest {
+    TexelRequest {
+        mask: request.mask & 1 << lane,
+        ..*request
+    }
+}
+
+/// The answers of the lanes of an access, read one by one.
+fn read_alone(table: &ImageTable, request: &TexelRequest) -> [LaneWords; 4] {
+    let mut out: [LaneWords; 4] = [[0; 16]; 4];
+    for lane in 0..16 {
+        let found = table.read(0, &of_lane(request, lane));
+        for (out, found) in out.iter_mut().zip(found) {
+            out[lane] = found[lane];
+        }
+    }
+    out
+}
+
 /// Lanes are decoded and encoded together; each must read and write what it does alone.
 #[gaurast_runner::test]
 fn lanes_together_do_as_each_alone() {
@@ -136,43 +156,32 @@ fn lanes_together_do_as_each_alone() {
         }
         checked += 1;
         let desc = desc(ImageKind::D2, format, [5, 4, 1]);
-        let [together, alone] = [(); 2].map(|()| {
-            storage(image(desc, |_, _, [x, y, _]| {
-                [x as f32 / 4.0, y as f32 / 3.0, 0.3, 0.7]
-            }))
-        });
+        let filled = || {
+            let texel = |x: u32, y: u32| [x as f32 / 4.0, y as f32 / 3.0, 0.3, 0.7];
+            storage(image(desc, |_, _, [x, y, _]| texel(x, y)))
+        };
+        let (together, alone) = (filled(), filled());
         // Some lanes are outside, and some are not active.
         let at: Vec<[u32; 4]> = (0..16).map(|lane| [lane % 6, lane / 3, 0, 0]).collect();
-        let request = TexelRequest {
-            mask: 0b1101_1110_1011_0111,
-            ..texels(shape(Dimension::D2), &at)
+        let mut request = texels(shape(Dimension::D2), &at);
+        request.mask = 0b1101_1110_1011_0111;
+        let (all, each) = (together.read(0, &request), read_alone(&alone, &request));
+        assert_eq!(all, each, "{format:?}");
+        let value = |factor: u32, lane: u32| match format.is_integer() {
+            true => factor * lane * 4,
+            false => ((factor * lane) as f32 / 100.0).to_bits(),
         };
-        let of_lane = |lane: usize| TexelRequest {
-            mask: request.mask & 1 << lane,
-            ..request
-        };
-        let read_alone = |table: &ImageTable| {
-            let mut out = [[0; 16]; 4];
-            for lane in 0..16 {
-                let found = table.read(0, &of_lane(lane));
-                for component in 0..4 {
-                    out[component][lane] = found[component][lane];
-                }
-            }
-            out
-        };
-        assert_eq!(together.read(0, &request), read_alone(&alone), "{format:?}");
-        let values = [3, 7, 11, 13].map(|factor| {
-            std::array::from_fn(|lane| match format.is_integer() {
-                true => (factor * lane * 4) as u32,
-                false => (factor * lane) as f32 / 100.0,
-            })
-        });
+        let values: [LaneWords; 4] =
+            [3, 7, 11, 13].map(|factor| std::array::from_fn(|lane| value(factor, lane as u32)));
         together.write(0, &request, &values);
         for lane in 0..16 {
-            alone.write(0, &of_lane(lane), &values);
+            alone.write(0, &of_lane(&request, lane), &values);
         }
-        assert_eq!(read_alone(&together), read_alone(&alone), "{format:?}");
+        let (all, each) = (
+            read_alone(&together, &request),
+            read_alone(&alone, &request),
+        );
+        assert_eq!(all, each, "{format:?}");
     }
     assert!(checked > 50, "{checked}");
 }

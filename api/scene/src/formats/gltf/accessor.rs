@@ -1,6 +1,7 @@
 //! Accessors: attributes of vertices as floats, and indices.
 
 use super::buffers::Buffers;
+use super::document::Sparse;
 use crate::error::{Fault, Place, Reason};
 
 /// The type of an attribute's components: glTF's `componentType`, and true if integers are normalized to fractions.
@@ -107,27 +108,31 @@ pub(super) fn indices(
     index: usize,
     place: &str,
 ) -> Result<Vec<u32>, Fault> {
-    const INDEX: Demand = Demand {
-        width: 1,
-        components: &[
-            Component::plain(UNSIGNED_BYTE),
-            Component::plain(UNSIGNED_SHORT),
-            Component::plain(UNSIGNED_INT),
-        ],
-        expected: "unsigned byte, short or int",
-    };
-    decoded(
-        buffers,
-        index,
-        &INDEX,
-        place,
-        |component, bytes| match component.size() {
-            1 => bytes[0].into(),
-            2 => u16::from_le_bytes([bytes[0], bytes[1]]).into(),
-            _ => u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]),
-        },
-    )
+    decoded(buffers, index, &INDEX, place, decode_index)
 }
+
+/// The types of indices.
+const INDEX: Demand = Demand {
+    width: 1,
+    components: &[
+        Component::plain(UNSIGNED_BYTE),
+        Component::plain(UNSIGNED_SHORT),
+        Component::plain(UNSIGNED_INT),
+    ],
+    expected: "unsigned byte, short or int",
+};
+
+/// The index that begins `bytes`.
+fn decode_index(component: Component, bytes: &[u8]) -> u32 {
+    match component.size() {
+        1 => bytes[0].into(),
+        2 => u16::from_le_bytes([bytes[0], bytes[1]]).into(),
+        _ => u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]),
+    }
+}
+
+/// The most elements of an accessor without a buffer view, which are zeros. A small file could claim any number.
+const MOST_ZEROS: usize = 1 << 24;
 
 /// The components of accessor `index`, element after element, each decoded by `decode` from the bytes that it begins.
 fn decoded<T>(
@@ -161,36 +166,123 @@ fn decoded<T>(
         let (found, expected) = (component.name(), demand.expected);
         return Err(at(Reason::Type { found, expected }));
     }
-    if accessor.sparse.is_some() {
-        let text = "it is sparse, which is not read";
-        return Err(at(Reason::Unsupported(text.to_owned())));
-    }
-    let Some(view) = accessor.buffer_view else {
-        let text = "it has no data of its own";
-        return Err(at(Reason::Unsupported(text.to_owned())));
-    };
-    let (bytes, stride) = buffers.view(view, place)?;
     let size = demand.width * component.size();
-    let stride = stride.unwrap_or(size);
-    let available = bytes.len() as u64;
-    let bytes = bytes.get(accessor.byte_offset..).unwrap_or_default();
-    let claimed = (accessor.count as u64)
-        .saturating_sub(1)
-        .saturating_mul(stride as u64)
-        .saturating_add(size as u64)
-        .saturating_add(accessor.byte_offset as u64);
-    if claimed > available || stride < size {
-        return Err(at(Reason::TooShort { claimed, available }));
-    }
-    let len = accessor.count * demand.width;
+    let len = accessor.count.saturating_mul(demand.width);
     let mut values = Vec::new();
-    values
-        .try_reserve_exact(len)
-        .map_err(|_| at(Reason::Memory(4 * len as u64)))?;
-    for element in bytes.chunks(stride).take(accessor.count) {
-        for c in 0..demand.width {
-            values.push(decode(component, &element[c * component.size()..]));
+    let reserve = |values: &mut Vec<T>| {
+        let reserved = values.try_reserve_exact(len);
+        reserved.map_err(|_| at(Reason::Memory(4 * len as u64)))
+    };
+    match (accessor.buffer_view, &accessor.sparse) {
+        (Some(view), _) => {
+            let elements = Elements {
+                view,
+                byte_offset: accessor.byte_offset,
+                count: accessor.count,
+                size,
+            };
+            let elements = elements.of(buffers, place)?;
+            reserve(&mut values)?;
+            for element in elements {
+                let parts = element.chunks(component.size()).take(demand.width);
+                values.extend(parts.map(|part| decode(component, part)));
+            }
+        }
+        // Elements that are not replaced are zeros.
+        (None, Some(_)) if accessor.count <= MOST_ZEROS => {
+            reserve(&mut values)?;
+            values.extend((0..len).map(|_| decode(component, &[0; 4])));
+        }
+        (None, Some(_)) => {
+            let text = format!("it has more than {MOST_ZEROS} elements without a buffer view");
+            return Err(at(Reason::Unsupported(text)));
+        }
+        (None, None) => {
+            let text = "it has no data of its own";
+            return Err(at(Reason::Unsupported(text.to_owned())));
+        }
+    }
+    if let Some(sparse) = &accessor.sparse {
+        let place = format!("{place}, sparse");
+        let replaced = sparse_indices(buffers, sparse, &place)?;
+        let elements = Elements {
+            view: sparse.values.buffer_view,
+            byte_offset: sparse.values.byte_offset,
+            count: sparse.count,
+            size,
+        };
+        let elements = elements.of(buffers, &format!("{place}.values"))?;
+        for (index, element) in replaced.into_iter().zip(elements) {
+            let first = (index as usize).saturating_mul(demand.width);
+            let range = first..first.saturating_add(demand.width);
+            let Some(values) = values.get_mut(range) else {
+                let text = format!("it replaces element {index} of {}", accessor.count);
+                return Err(Reason::Unsupported(text).at(Place::Part(format!("{place}.indices"))));
+            };
+            for (value, part) in values.iter_mut().zip(element.chunks(component.size())) {
+                *value = decode(component, part);
+            }
         }
     }
     Ok(values)
+}
+
+/// The numbers of the elements that `sparse` replaces.
+fn sparse_indices(
+    buffers: &mut Buffers<'_>,
+    sparse: &Sparse,
+    place: &str,
+) -> Result<Vec<u32>, Fault> {
+    let place = format!("{place}.indices");
+    let component = Component::plain(sparse.indices.component_type);
+    if !INDEX.components.contains(&component) {
+        let (found, expected) = (component.name(), INDEX.expected);
+        return Err(Reason::Type { found, expected }.at(Place::Part(place)));
+    }
+    let elements = Elements {
+        view: sparse.indices.buffer_view,
+        byte_offset: sparse.indices.byte_offset,
+        count: sparse.count,
+        size: component.size(),
+    };
+    let elements = elements.of(buffers, &place)?;
+    Ok(elements
+        .map(|bytes| decode_index(component, bytes))
+        .collect())
+}
+
+/// Elements in a buffer view.
+struct Elements {
+    /// The buffer view.
+    view: usize,
+    /// The first byte in it.
+    byte_offset: usize,
+    /// The number of elements.
+    count: usize,
+    /// The bytes of an element.
+    size: usize,
+}
+
+impl Elements {
+    /// The bytes of each element, and of what lies between it and the next. Messages name them `place`.
+    fn of<'b>(
+        &self,
+        buffers: &'b mut Buffers<'_>,
+        place: &str,
+    ) -> Result<impl Iterator<Item = &'b [u8]> + use<'b>, Fault> {
+        let (bytes, stride) = buffers.view(self.view, place)?;
+        let stride = stride.unwrap_or(self.size);
+        let available = bytes.len() as u64;
+        let bytes = bytes.get(self.byte_offset..).unwrap_or_default();
+        let claimed = (self.count as u64)
+            .saturating_sub(1)
+            .saturating_mul(stride as u64)
+            .saturating_add(self.size as u64)
+            .saturating_add(self.byte_offset as u64);
+        if claimed > available || stride < self.size {
+            let reason = Reason::TooShort { claimed, available };
+            return Err(reason.at(Place::Part(place.to_owned())));
+        }
+        Ok(bytes.chunks(stride).take(self.count))
+    }
 }

@@ -123,7 +123,35 @@ pub(super) struct Accessor {
     pub(super) count: usize,
     #[serde(rename = "type")]
     pub(super) shape: String,
-    pub(super) sparse: Option<IgnoredAny>,
+    pub(super) sparse: Option<Sparse>,
+}
+
+/// Elements of an accessor that are replaced.
+#[derive(Deserialize)]
+pub(super) struct Sparse {
+    /// The number of elements that are replaced.
+    pub(super) count: usize,
+    pub(super) indices: SparseIndices,
+    pub(super) values: SparseValues,
+}
+
+/// The numbers of the elements, in ascending order.
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct SparseIndices {
+    pub(super) buffer_view: usize,
+    #[serde(default)]
+    pub(super) byte_offset: usize,
+    pub(super) component_type: u32,
+}
+
+/// The values that replace them, in the accessor's type.
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct SparseValues {
+    pub(super) buffer_view: usize,
+    #[serde(default)]
+    pub(super) byte_offset: usize,
 }
 
 #[derive(Deserialize)]
