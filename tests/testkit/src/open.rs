@@ -84,7 +84,7 @@ impl Opening<'_> {
 }
 
 /// Extensions of this driver that tests use.
-pub const EXTENSIONS: [&CStr; 6] = [
+pub const EXTENSIONS: [&CStr; 7] = [
     ash::khr::map_memory2::NAME,
     ash::khr::performance_query::NAME,
     ash::khr::push_descriptor::NAME,
