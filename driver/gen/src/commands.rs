@@ -143,8 +143,12 @@ fn rows<'a>(registry: &'a Registry, support: &'a Support) -> Result<Vec<Row<'a>>
         let names = extension
             .requirements
             .iter()
-            .filter(|requirement| support.meets(requirement.depends.as_deref()))
-            .flat_map(|requirement| &requirement.commands)
+            .flat_map(|requirement| {
+                let is_met = support.meets(requirement.depends.as_deref());
+                let commands = requirement.commands.iter();
+                // Earlier registries had them without a condition, so that programs ask for their functions.
+                commands.filter(move |name| is_met || support.commands.refused.contains_key(*name))
+            })
             .filter(|name| !seen.contains(name));
         for name in names {
             let by = format!("c\"{}\"", extension.name);

@@ -323,7 +323,12 @@ static ROWS: &[Command] = rows! {
         vkCmdSetColorBlendEquationEXT: vk::PFN_vkCmdSetColorBlendEquationEXT = vkCmdSetColorBlendEquationEXT;
         vkCmdSetColorWriteMaskEXT: vk::PFN_vkCmdSetColorWriteMaskEXT = vkCmdSetColorWriteMaskEXT;
         vkCmdSetTessellationDomainOriginEXT: vk::PFN_vkCmdSetTessellationDomainOriginEXT = vkCmdSetTessellationDomainOriginEXT;
+        vkCmdSetRasterizationStreamEXT: vk::PFN_vkCmdSetRasterizationStreamEXT = vkCmdSetRasterizationStreamEXT;
+        vkCmdSetConservativeRasterizationModeEXT: vk::PFN_vkCmdSetConservativeRasterizationModeEXT = vkCmdSetConservativeRasterizationModeEXT;
+        vkCmdSetExtraPrimitiveOverestimationSizeEXT: vk::PFN_vkCmdSetExtraPrimitiveOverestimationSizeEXT = vkCmdSetExtraPrimitiveOverestimationSizeEXT;
         vkCmdSetDepthClipEnableEXT: vk::PFN_vkCmdSetDepthClipEnableEXT = vkCmdSetDepthClipEnableEXT;
+        vkCmdSetSampleLocationsEnableEXT: vk::PFN_vkCmdSetSampleLocationsEnableEXT = vkCmdSetSampleLocationsEnableEXT;
+        vkCmdSetColorBlendAdvancedEXT: vk::PFN_vkCmdSetColorBlendAdvancedEXT = vkCmdSetColorBlendAdvancedEXT;
         vkCmdSetProvokingVertexModeEXT: vk::PFN_vkCmdSetProvokingVertexModeEXT = vkCmdSetProvokingVertexModeEXT;
         vkCmdSetLineRasterizationModeEXT: vk::PFN_vkCmdSetLineRasterizationModeEXT = vkCmdSetLineRasterizationModeEXT;
         vkCmdSetLineStippleEnableEXT: vk::PFN_vkCmdSetLineStippleEnableEXT = vkCmdSetLineStippleEnableEXT;
@@ -4896,6 +4901,70 @@ unsafe extern "system" fn vkCmdSetTessellationDomainOriginEXT(
     )
 }
 
+unsafe extern "system" fn vkCmdSetRasterizationStreamEXT(
+    command_buffer: vk::CommandBuffer,
+    _: u32,
+) {
+    guard(command_buffer, "vkCmdSetRasterizationStreamEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: the handle is live.
+        unsafe {
+            record(command_buffer, "vkCmdSetRasterizationStreamEXT", |_| {
+                Err(Error::Unsupported {
+                    command: "vkCmdSetRasterizationStreamEXT".to_owned(),
+                })
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetConservativeRasterizationModeEXT(
+    command_buffer: vk::CommandBuffer,
+    _: vk::ConservativeRasterizationModeEXT,
+) {
+    guard(
+        command_buffer,
+        "vkCmdSetConservativeRasterizationModeEXT",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: the handle is live.
+            unsafe {
+                record(
+                    command_buffer,
+                    "vkCmdSetConservativeRasterizationModeEXT",
+                    |_| {
+                        Err(Error::Unsupported {
+                            command: "vkCmdSetConservativeRasterizationModeEXT".to_owned(),
+                        })
+                    },
+                )
+            }
+        },
+    )
+}
+
+unsafe extern "system" fn vkCmdSetExtraPrimitiveOverestimationSizeEXT(
+    command_buffer: vk::CommandBuffer,
+    _: f32,
+) {
+    guard(
+        command_buffer,
+        "vkCmdSetExtraPrimitiveOverestimationSizeEXT",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: the handle is live.
+            unsafe {
+                record(
+                    command_buffer,
+                    "vkCmdSetExtraPrimitiveOverestimationSizeEXT",
+                    |_| {
+                        Err(Error::Unsupported {
+                            command: "vkCmdSetExtraPrimitiveOverestimationSizeEXT".to_owned(),
+                        })
+                    },
+                )
+            }
+        },
+    )
+}
+
 unsafe extern "system" fn vkCmdSetDepthClipEnableEXT(
     command_buffer: vk::CommandBuffer,
     depth_clip_enable: vk::Bool32,
@@ -4909,6 +4978,40 @@ unsafe extern "system" fn vkCmdSetDepthClipEnableEXT(
                     recorder,
                     DynamicState::DepthClipEnable { enable },
                 )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetSampleLocationsEnableEXT(
+    command_buffer: vk::CommandBuffer,
+    _: vk::Bool32,
+) {
+    guard(command_buffer, "vkCmdSetSampleLocationsEnableEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: the handle is live.
+        unsafe {
+            record(command_buffer, "vkCmdSetSampleLocationsEnableEXT", |_| {
+                Err(Error::Unsupported {
+                    command: "vkCmdSetSampleLocationsEnableEXT".to_owned(),
+                })
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetColorBlendAdvancedEXT(
+    command_buffer: vk::CommandBuffer,
+    _: u32,
+    _: u32,
+    _: *const vk::ColorBlendAdvancedEXT,
+) {
+    guard(command_buffer, "vkCmdSetColorBlendAdvancedEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: the handle is live.
+        unsafe {
+            record(command_buffer, "vkCmdSetColorBlendAdvancedEXT", |_| {
+                Err(Error::Unsupported {
+                    command: "vkCmdSetColorBlendAdvancedEXT".to_owned(),
+                })
             })
         }
     })
