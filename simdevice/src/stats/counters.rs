@@ -88,6 +88,7 @@ counters! {
     TilesOverwritten: "optimizations", "tiles overwritten", Count, "Tiles of colour attachments that were neither loaded nor cleared, because a primitive overwrote them as a whole";
     QuadsOverwritten: "optimizations", "quads overwritten", Count, "Quads of tiles that were not shaded, because a later primitive of the draw overwrote the tile as a whole";
     QuadsMasked: "optimizations", "quads masked", Count, "Quads of primitives' blocks that were not shaded, because no sample of them was left";
+    BatchesAffine: "optimizations", "batches affine", Count, "Batches of fragments whose perspective-correct inputs needed no division";
     InputVertices: "geometry", "input vertices", Count, "Vertices or indices of draws of points, lines and triangles";
     InputPrimitives: "geometry", "input primitives", Count, "Points, lines and triangles that were assembled";
     VertexInvocations: "geometry", "vertex invocations", Count, "Vertices shaded";

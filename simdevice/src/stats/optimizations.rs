@@ -47,6 +47,7 @@ optimizations! {
     OverwrittenQuads: "overwritten-quads", QuadsOverwritten, "Quads of tiles that one primitive covers and another of the draw overwrites are not shaded.";
     HierarchicalDepth: "hierarchical-depth", TilesHidden, "A primitive that all depths of a tile hide is not tested there pixel by pixel.";
     MaskedQuads: "masked-quads", QuadsMasked, "Quads of which coverage and early tests leave nothing are not shaded.";
+    Affine: "affine", BatchesAffine, "Barycentrics are not divided by 1 / w where that is the same all over each primitive.";
 }
 
 /// The optimizations that a device uses.
@@ -154,8 +155,8 @@ mod tests {
         }
         let most = Optimizations::ALL
             .without(Optimization::Blocks)
-            .without(Optimization::MaskedQuads);
-        assert_eq!("all,-blocks,-masked-quads".parse(), Ok(most));
+            .without(Optimization::Affine);
+        assert_eq!("all,-blocks,-affine".parse(), Ok(most));
     }
 
     #[gaurast_runner::test]
@@ -178,7 +179,7 @@ mod tests {
                 .unwrap_err()
                 .to_string(),
             "\"everything\" is neither all nor none nor an optimization, which are cluster-culling, occlusion-culling, temporal-reuse, bounds, ellipse, harmonics, blocks, early-termination, \
-             empty-tiles, overwritten-tiles, overwritten-quads, hierarchical-depth, masked-quads"
+             empty-tiles, overwritten-tiles, overwritten-quads, hierarchical-depth, masked-quads, affine"
         );
     }
 }

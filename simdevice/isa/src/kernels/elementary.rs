@@ -121,6 +121,9 @@ fn scale<S: Simd>(x: F<S>, exponent: I<S>) -> F<S> {
     x * power_of_two(half) * power_of_two(exponent - half)
 }
 
+/// The greatest number whose exponential is finite.
+const GREATEST_EXPONENT: f32 = 88.722_83;
+
 /// `e^x * 2^bias`.
 #[inline(always)]
 fn exp_biased<S: Simd>(x: F<S>, bias: i32) -> F<S> {
@@ -415,19 +418,26 @@ fn atan2<S: Simd>(y: F<S>, x: F<S>) -> F<S> {
     (x.is_nan() | y.is_nan()).select(splat(x, f32::NAN), angle)
 }
 
+/// Half of `e^x`, infinite where `e^x` overflows: Vulkan derives hyperbolic functions from exponentials.
+#[inline(always)]
+fn half_of_exp<S: Simd>(x: F<S>) -> F<S> {
+    let overflows = x.simd_gt(splat(x, GREATEST_EXPONENT));
+    overflows.select(splat(x, f32::INFINITY), exp_biased(x, -1))
+}
+
 #[inline(always)]
 fn sinh<S: Simd>(x: F<S>) -> F<S> {
     let a = x.abs();
     let z = x * x;
     let near = (polynomial(z, [2.037_219_1e-4, 8.330_284e-3, 1.666_671_6e-1]) * z).mul_add(a, a);
-    let half = exp_biased(a, -1);
+    let half = half_of_exp(a);
     let far = half - splat(x, 0.25) / half;
     with_sign(a.simd_lt(splat(x, 1.0)).select(near, far), x)
 }
 
 #[inline(always)]
 fn cosh<S: Simd>(x: F<S>) -> F<S> {
-    let half = exp_biased(x.abs(), -1);
+    let half = half_of_exp(x.abs());
     half + splat(x, 0.25) / half
 }
 

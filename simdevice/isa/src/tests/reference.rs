@@ -344,8 +344,8 @@ pub fn apply(op: Op, operands: &[u64], fused: bool) -> u64 {
         Op::FAcos => wide(f64::acos),
         Op::FAtan => wide(f64::atan),
         Op::FAtan2 => f(f64::from(fa).atan2(f64::from(fb)) as f32),
-        Op::FSinh => wide(f64::sinh),
-        Op::FCosh => wide(f64::cosh),
+        Op::FSinh => wide(|x| by_exponential(x, f64::sinh)),
+        Op::FCosh => wide(|x| by_exponential(x, f64::cosh)),
         Op::FTanh => wide(f64::tanh),
         Op::FAsinh => wide(f64::asinh),
         Op::FAcosh => wide(f64::acosh),
@@ -515,4 +515,12 @@ fn ldexp(mut a: f64, mut exponent: i32) -> f64 {
         return a * 2f64.powi(-1021) * 2f64.powi(exponent + 1021);
     }
     a * 2f64.powi(exponent)
+}
+
+/// A hyperbolic function of a binary32 number, as half of an exponential that overflows in binary32.
+pub fn by_exponential(x: f64, function: fn(f64) -> f64) -> f64 {
+    match x.abs() > f64::from(f32::MAX).ln() {
+        true => function(x).signum() * f64::INFINITY,
+        false => function(x),
+    }
 }

@@ -74,6 +74,8 @@ pub struct Batch {
     side: u32,
     /// True if some pixels of quads are not covered.
     partial: bool,
+    /// True if 1 / w is constant in each primitive, so that barycentrics need no perspective correction.
+    affine: bool,
     pub quads: [Quad; QUADS],
     pub count: usize,
     /// A bit for each tile: 1 if the batch has quads of it.
@@ -100,6 +102,7 @@ impl Default for Batch {
             corner: [0; 2],
             side: 1,
             partial: false,
+            affine: true,
             quads: [Quad::default(); QUADS],
             count: 0,
             tiles: 0,
@@ -121,7 +124,7 @@ impl Default for Batch {
 pub struct BlockValues<S: Simd> {
     pub barycentrics: [f32x16<S>; 2],
     pub depth: f32x16<S>,
-    /// The value of 1 / w, in units of the set-up's `scale`: 1 if it is constant in the primitive.
+    /// The value of 1 / w. If it is constant in the primitive, it is 1 here, and the unit is in the set-up.
     pub inverse_w: f32x16<S>,
 }
 
@@ -159,7 +162,7 @@ impl<S: Simd> BlockValues<S> {
                 add(bases[1] as f32, setup.lane_barycentrics[1]),
             ];
         }
-        if needs.inverse_w {
+        if needs.inverse_w && !setup.affine {
             self.inverse_w = add(setup.inverse_w(bases), setup.lane_w);
         }
     }
@@ -189,7 +192,7 @@ impl Batch {
 
     /// Removes all quads and records.
     pub fn clear(&mut self) {
-        self.partial = false;
+        (self.affine, self.partial) = (true, false);
         (self.count, self.tiles) = (0, 0);
         self.records.clear();
         self.attributes.clear();
@@ -203,6 +206,7 @@ impl Batch {
         interface: &Interface,
         varyings: &Varyings,
     ) -> u16 {
+        self.affine &= setup.affine;
         self.records.push(Record {
             id: primitive.id,
             layer: primitive.layer,
@@ -447,7 +451,7 @@ impl Batch {
         ]
     }
 
-    /// Sets a program's inputs.
+    /// Sets a program's inputs. Returns true if perspective-correct varyings needed no division.
     #[inline(always)]
     pub fn set_inputs<S: Simd>(
         &mut self,
@@ -455,12 +459,13 @@ impl Batch {
         interface: &Interface,
         samples: Samples,
         machine: &mut Machine,
-    ) {
+    ) -> bool {
         let perspective = interface
             .varyings
             .iter()
             .any(|(_, interpolation)| *interpolation == Interpolation::Perspective);
-        if perspective {
+        let divided = perspective && !self.affine;
+        if divided {
             self.divide(simd);
         }
         let at_centers = samples.positions.len() == 1 || samples.each_shaded;
@@ -477,7 +482,7 @@ impl Batch {
                     && (at_centers || sampling != Sampling::Centroid) =>
                 {
                     let barycentrics = match interpolation {
-                        Interpolation::Perspective => &self.perspective,
+                        Interpolation::Perspective if divided => &self.perspective,
                         _ => &self.barycentrics,
                     };
                     self.interpolate(simd, place, interface.varyings.len(), barycentrics, lanes);
@@ -490,6 +495,7 @@ impl Batch {
                 }
             }
         }
+        perspective && !divided
     }
 
     /// Interpolates a varying for all chunks of `out`.

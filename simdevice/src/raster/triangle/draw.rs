@@ -148,7 +148,9 @@ impl<'a> TriangleTileDraw<'a> {
             samples,
             area,
             ranges: depth_ranges(state),
-            needs: interface.map_or_else(Needs::default, |interface| needs(interface, path)),
+            needs: interface.map_or_else(Needs::default, |interface| {
+                needs(interface, path, optimizations)
+            }),
             optimizations,
             level: runtime.level(),
             limit: runtime.config().shader_timeout,
@@ -235,7 +237,7 @@ fn depth_ranges(state: &DrawState) -> Vec<(f32, f32)> {
 }
 
 /// The values that the fragments of a program need on a path.
-fn needs(interface: &Interface, path: Path) -> Needs {
+fn needs(interface: &Interface, path: Path, optimizations: Optimizations) -> Needs {
     let reads = |wanted: fn(FragmentInput) -> bool| {
         let mut inputs = interface.inputs.iter();
         inputs.any(|&(_, input, _)| wanted(input))
@@ -258,5 +260,6 @@ fn needs(interface: &Interface, path: Path) -> Needs {
                 } | FragmentInput::FragCoord(3)
             )
         }),
+        detects_affine: optimizations.has(Optimization::Affine),
     }
 }

@@ -544,7 +544,10 @@ impl Renderer<'_, '_> {
         let machine = machines.of_size(size);
         let batch = &mut *self.batch;
         batch.prepare();
-        dispatch!(level, simd => batch.set_inputs(simd, &stage.interface, draw.samples, machine));
+        let affine = dispatch!(level, simd => batch.set_inputs(
+            simd, &stage.interface, draw.samples, machine
+        ));
+        self.counters.add(Counter::BatchesAffine, affine.into());
         let watchdog = Watchdog {
             limit: draw.limit,
             cancel: Some(self.cancel),
@@ -824,8 +827,13 @@ impl Renderer<'_, '_> {
         full.attributes.clear();
         let (primitive, varyings) = (current.primitive, current.varyings);
         add_attributes(primitive, interface, varyings, &mut full.attributes);
+        let divides = draw.needs.inverse_w && !current.setup.affine;
         if draw.needs.barycentrics {
-            full.find_barycentrics(simd, current.setup, tile.corner, draw.needs);
+            let needs = Needs {
+                inverse_w: divides,
+                ..draw.needs
+            };
+            full.find_barycentrics(simd, current.setup, tile.corner, needs);
         }
         let Some(machines) = self.machines.as_mut() else {
             return Ok(());
@@ -835,9 +843,11 @@ impl Renderer<'_, '_> {
             if let FragmentInput::Varying { interpolation, .. } = kind {
                 let attribute = full.attributes[place];
                 let lanes = machine.input_mut(slot);
-                full.interpolate(simd, interpolation, attribute, lanes);
+                full.interpolate(simd, interpolation, divides, attribute, lanes);
             }
         }
+        let undivided = draw.needs.inverse_w && !divides;
+        self.counters.add(Counter::BatchesAffine, undivided.into());
         let watchdog = Watchdog {
             limit: draw.limit,
             cancel: Some(self.cancel),

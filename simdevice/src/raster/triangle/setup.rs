@@ -56,6 +56,8 @@ pub struct TriangleSetup {
     pub w_slopes: [f32; 2],
     /// The values of 1 / w at corners 1 and 2, in units of `scale`.
     pub weights: [f32; 2],
+    /// True if 1 / w is known to be the same at all corners.
+    pub affine: bool,
     /// The unit of 1 / w: its value if it is the same at all corners, so that no digits are lost; otherwise 1.
     pub scale: f32,
 }
@@ -199,6 +201,7 @@ impl TriangleSetup {
         } else {
             [iw0, iw1, iw2]
         };
+        let affine = is_constant && needs.detects_affine;
         let inverse_w = three(weights, f64::from);
         let (d1, d2) = (inverse_w[1] - inverse_w[0], inverse_w[2] - inverse_w[0]);
         let along = |axis: usize| (d1 * slopes[0][axis] + d2 * slopes[1][axis]) as f32;
@@ -221,11 +224,12 @@ impl TriangleSetup {
         }
         self.depth_slopes = depth_slopes;
         self.inverse_w = inverse_w;
-        if needs.inverse_w {
+        if needs.inverse_w && !affine {
             self.lane_w = lanes(w_slopes);
         }
         self.w_slopes = w_slopes;
         self.weights = [weights[1], weights[2]];
+        self.affine = affine;
         self.scale = scale;
         true
     }
@@ -331,4 +335,6 @@ pub struct Needs {
     pub depth: bool,
     /// True if 1 / w is needed.
     pub inverse_w: bool,
+    /// True if set-up tests whether 1 / w is the same at all corners, so that it need not be interpolated.
+    pub detects_affine: bool,
 }

@@ -70,13 +70,14 @@ impl FullTile {
         &self,
         simd: S,
         interpolation: Interpolation,
+        divides: bool,
         attribute: [f32; 3],
         out: &mut [Vector],
     ) {
         let [b1, b2] = match interpolation {
             Interpolation::Flat => return out.fill(Vector([attribute[0].to_bits(); 16])),
-            Interpolation::Perspective => &self.perspective,
-            Interpolation::Linear => &self.linear,
+            Interpolation::Perspective if divides => &self.perspective,
+            _ => &self.linear,
         };
         let (b1, b2) = (b1.as_chunks::<16>().0, b2.as_chunks::<16>().0);
         let attribute = three(attribute, |value| f32x16::splat(simd, value));

@@ -116,7 +116,7 @@ fn cases() -> Vec<(&'static str, Scene)> {
         Path::Still,
         WARM,
     );
-    let small = Scene::counted("small triangles", "small-triangles");
+    let small = || Scene::counted("small triangles", "small-triangles");
     let layers = || Scene::counted("layers that hide one another", "layered-triangles");
     let floor = || Scene::counted("a textured floor", "textured-triangles");
     vec![
@@ -143,7 +143,9 @@ fn cases() -> Vec<(&'static str, Scene)> {
             "overwritten-tiles",
             Scene::counted("a layer that fills the picture", "one-layer"),
         ),
-        ("masked-quads", small),
+        ("masked-quads", small()),
+        ("affine", small()),
+        ("affine", layers()),
         ("overwritten-quads", layers()),
         ("hierarchical-depth", layers()),
     ]
