@@ -1,6 +1,7 @@
 //! Accessors: attributes of vertices as floats, and indices.
 
 use super::buffers::Buffers;
+use super::document::Sparse;
 use crate::error::{Fault, Place, Reason};
 
 /// The type of an attribute's components: glTF's `componentType`, and true if integers are normalized to fractions.
@@ -62,6 +63,16 @@ impl Component {
         }
     }
 
+    /// Decodes the index that begins `bytes`.
+    #[inline]
+    fn index(self, bytes: &[u8]) -> u32 {
+        match self.size() {
+            1 => bytes[0].into(),
+            2 => u16::from_le_bytes([bytes[0], bytes[1]]).into(),
+            _ => u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]),
+        }
+    }
+
     /// The name in messages.
     fn name(self) -> String {
         let kind = match self.kind {
@@ -91,6 +102,17 @@ pub(super) struct Demand {
     pub(super) expected: &'static str,
 }
 
+/// Indices, of vertices and of elements.
+const INDEX: Demand = Demand {
+    width: 1,
+    components: &[
+        Component::plain(UNSIGNED_BYTE),
+        Component::plain(UNSIGNED_SHORT),
+        Component::plain(UNSIGNED_INT),
+    ],
+    expected: "unsigned byte, short or int",
+};
+
 /// The values of accessor `index`, element after element. Messages name it `place`.
 pub(super) fn values(
     buffers: &mut Buffers<'_>,
@@ -107,30 +129,11 @@ pub(super) fn indices(
     index: usize,
     place: &str,
 ) -> Result<Vec<u32>, Fault> {
-    const INDEX: Demand = Demand {
-        width: 1,
-        components: &[
-            Component::plain(UNSIGNED_BYTE),
-            Component::plain(UNSIGNED_SHORT),
-            Component::plain(UNSIGNED_INT),
-        ],
-        expected: "unsigned byte, short or int",
-    };
-    decoded(
-        buffers,
-        index,
-        &INDEX,
-        place,
-        |component, bytes| match component.size() {
-            1 => bytes[0].into(),
-            2 => u16::from_le_bytes([bytes[0], bytes[1]]).into(),
-            _ => u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]),
-        },
-    )
+    decoded(buffers, index, &INDEX, place, Component::index)
 }
 
 /// The components of accessor `index`, element after element, each decoded by `decode` from the bytes that it begins.
-fn decoded<T>(
+fn decoded<T: Copy + Default>(
     buffers: &mut Buffers<'_>,
     index: usize,
     demand: &Demand,
@@ -161,36 +164,138 @@ fn decoded<T>(
         let (found, expected) = (component.name(), demand.expected);
         return Err(at(Reason::Type { found, expected }));
     }
-    if accessor.sparse.is_some() {
-        let text = "it is sparse, which is not read";
-        return Err(at(Reason::Unsupported(text.to_owned())));
-    }
-    let Some(view) = accessor.buffer_view else {
-        let text = "it has no data of its own";
-        return Err(at(Reason::Unsupported(text.to_owned())));
+    let count = accessor.count;
+    let mut values = match accessor.buffer_view {
+        Some(view) => {
+            let run = Run {
+                view,
+                offset: accessor.byte_offset,
+                count,
+                component,
+                width: demand.width,
+            };
+            run.decoded(buffers, place, &decode)?
+        }
+        None => {
+            let available = buffers.total_bytes();
+            if count as u64 > available {
+                let text = format!(
+                    "it has no data, and {count} elements of zeros are more than the {available} bytes of all buffers"
+                );
+                return Err(at(Reason::Unsupported(text)));
+            }
+            let mut zeros = reserved(count, demand.width).map_err(at)?;
+            zeros.resize(count * demand.width, T::default());
+            zeros
+        }
     };
-    let (bytes, stride) = buffers.view(view, place)?;
-    let size = demand.width * component.size();
-    let stride = stride.unwrap_or(size);
-    let available = bytes.len() as u64;
-    let bytes = bytes.get(accessor.byte_offset..).unwrap_or_default();
-    let claimed = (accessor.count as u64)
-        .saturating_sub(1)
-        .saturating_mul(stride as u64)
-        .saturating_add(size as u64)
-        .saturating_add(accessor.byte_offset as u64);
-    if claimed > available || stride < size {
-        return Err(at(Reason::TooShort { claimed, available }));
-    }
-    let len = accessor.count * demand.width;
-    let mut values = Vec::new();
-    values
-        .try_reserve_exact(len)
-        .map_err(|_| at(Reason::Memory(4 * len as u64)))?;
-    for element in bytes.chunks(stride).take(accessor.count) {
-        for c in 0..demand.width {
-            values.push(decode(component, &element[c * component.size()..]));
+    if let Some(sparse) = &accessor.sparse {
+        let place = format!("{place}, sparse");
+        let indices = sparse_indices(buffers, sparse, count, &place)?;
+        let run = Run {
+            view: sparse.values.buffer_view,
+            offset: sparse.values.byte_offset,
+            count: sparse.count,
+            component,
+            width: demand.width,
+        };
+        let replacing = run.decoded(buffers, &format!("{place}, values"), &decode)?;
+        for (index, element) in indices.iter().zip(replacing.chunks_exact(demand.width)) {
+            values[index * demand.width..][..demand.width].copy_from_slice(element);
         }
     }
+    Ok(values)
+}
+
+/// The indices of the elements that `sparse` replaces, each below `count`. Messages name it `place`.
+fn sparse_indices(
+    buffers: &mut Buffers<'_>,
+    sparse: &Sparse,
+    count: usize,
+    place: &str,
+) -> Result<Vec<usize>, Fault> {
+    let place = format!("{place}, indices");
+    let at = |reason: Reason| reason.at(Place::Part(place.clone()));
+    let component = Component::plain(sparse.indices.component_type);
+    if !INDEX.components.contains(&component) {
+        let (found, expected) = (component.name(), INDEX.expected);
+        return Err(at(Reason::Type { found, expected }));
+    }
+    let run = Run {
+        view: sparse.indices.buffer_view,
+        offset: sparse.indices.byte_offset,
+        count: sparse.count,
+        component,
+        width: 1,
+    };
+    let indices = run.decoded(buffers, &place, &Component::index)?;
+    if let Some(pair) = indices.windows(2).find(|pair| pair[0] >= pair[1]) {
+        let text = format!("they must grow, and {} follows {}", pair[1], pair[0]);
+        return Err(at(Reason::Unsupported(text)));
+    }
+    match indices.last() {
+        Some(last) if *last as usize >= count => {
+            let text = format!("element {last} is not one of the accessor's {count}");
+            Err(at(Reason::Unsupported(text)))
+        }
+        _ => Ok(indices.into_iter().map(|index| index as usize).collect()),
+    }
+}
+
+/// Elements that follow each other in a buffer view.
+struct Run {
+    view: usize,
+    /// The first element's byte in the view.
+    offset: usize,
+    /// The number of elements.
+    count: usize,
+    component: Component,
+    /// The components of an element.
+    width: usize,
+}
+
+impl Run {
+    /// The components, element after element, each decoded by `decode` from the bytes that it begins. Messages name the
+    /// run `place`.
+    fn decoded<T>(
+        &self,
+        buffers: &mut Buffers<'_>,
+        place: &str,
+        decode: &impl Fn(Component, &[u8]) -> T,
+    ) -> Result<Vec<T>, Fault> {
+        let at = |reason: Reason| reason.at(Place::Part(place.to_owned()));
+        let (bytes, stride) = buffers.view(self.view, place)?;
+        let size = self.width * self.component.size();
+        let stride = stride.unwrap_or(size);
+        let available = bytes.len() as u64;
+        let bytes = bytes.get(self.offset..).unwrap_or_default();
+        let claimed = (self.count as u64)
+            .saturating_sub(1)
+            .saturating_mul(stride as u64)
+            .saturating_add(size as u64)
+            .saturating_add(self.offset as u64);
+        if claimed > available || stride < size {
+            return Err(at(Reason::TooShort { claimed, available }));
+        }
+        let mut values = reserved(self.count, self.width).map_err(at)?;
+        for element in bytes.chunks(stride).take(self.count) {
+            for c in 0..self.width {
+                values.push(decode(
+                    self.component,
+                    &element[c * self.component.size()..],
+                ));
+            }
+        }
+        Ok(values)
+    }
+}
+
+/// An empty list with memory for `count` elements of `width` components.
+fn reserved<T>(count: usize, width: usize) -> Result<Vec<T>, Reason> {
+    let mut values = Vec::new();
+    let memory = |_| Reason::Memory((count as u64).saturating_mul(4 * width as u64));
+    values
+        .try_reserve_exact(count.saturating_mul(width))
+        .map_err(memory)?;
     Ok(values)
 }
