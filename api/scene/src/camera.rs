@@ -10,15 +10,20 @@ pub const DEFAULT_FOV: f64 = 50.0;
 
 /// The projection model of a camera.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Model {
     /// Perspective.
     #[default]
+    #[serde(alias = "Pinhole")]
     Pinhole,
     /// Equidistant fisheye: focal lengths are pixels per radian.
+    #[serde(alias = "Fisheye")]
     Fisheye,
     /// A panorama of longitude and latitude: focal lengths are pixels per radian.
+    #[serde(alias = "Equirectangular")]
     Equirectangular,
     /// Parallel rays: focal lengths are pixels per unit of length.
+    #[serde(alias = "Orthographic")]
     Orthographic,
 }
 
@@ -79,8 +84,8 @@ pub enum CameraError {
     /// Up is zero or along the line of sight.
     #[error("up is zero, or along the line of sight")]
     NoUp,
-    /// The field of view is not between 0 and 180 degrees.
-    #[error("the field of view is not between 0 and 180 degrees")]
+    /// The field of view is not between 0 and 180 degrees, or 360 for a fisheye.
+    #[error("the field of view is not between 0 and 180 degrees, or 360 for a fisheye")]
     FieldOfView,
     /// A focal length is zero, or too large for binary32.
     #[error("the camera's focal length is zero or beyond binary32, which it is drawn in")]

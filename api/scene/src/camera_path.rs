@@ -3,7 +3,7 @@
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use crate::camera::{Camera, CameraError, DEFAULT_FOV};
+use crate::camera::{Camera, CameraError, DEFAULT_FOV, Model};
 use crate::framing::DEFAULT_UP;
 
 /// A camera that a path goes through.
@@ -17,9 +17,13 @@ pub struct Keyframe {
     /// The direction upwards in the picture.
     #[serde(default = "default_up")]
     pub up: [f64; 3],
-    /// The vertical field of view in degrees.
+    /// The vertical field of view in degrees. An orthographic camera shows the target as large as a pinhole with this
+    /// field of view does; a panorama has none.
     #[serde(default = "default_fov")]
     pub fov: f64,
+    /// The projection model. Between keyframes it is that of the one before.
+    #[serde(default, skip_serializing_if = "is_pinhole")]
+    pub camera: Model,
     /// The time at which the camera is here. Keyframes without times are one unit apart.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time: Option<f64>,
@@ -33,17 +37,28 @@ fn default_fov() -> f64 {
     DEFAULT_FOV
 }
 
+fn is_pinhole(model: &Model) -> bool {
+    *model == Model::Pinhole
+}
+
 impl Keyframe {
     /// The keyframe of a camera that looks at a point `distance` ahead of it.
     pub fn of(camera: &Camera, distance: f64) -> Self {
         let [_, down, forward] = camera.rotation.map(DVec3::from_array);
         let eye = DVec3::from_array(camera.eye);
-        let half_height = f64::from(camera.height) / 2.0 / camera.focal[1];
+        let height = f64::from(camera.height) / camera.focal[1];
+        let fov = match camera.model {
+            Model::Pinhole => 2.0 * (height / 2.0).atan().to_degrees(),
+            Model::Orthographic => 2.0 * (height / 2.0 / distance).atan().to_degrees(),
+            Model::Fisheye => height.to_degrees(),
+            Model::Equirectangular => DEFAULT_FOV,
+        };
         Self {
             eye: camera.eye,
             target: (eye + distance * forward).into(),
             up: (-down).into(),
-            fov: 2.0 * half_height.atan().to_degrees(),
+            fov,
+            camera: camera.model,
             time: None,
         }
     }
@@ -53,7 +68,19 @@ impl Keyframe {
     /// # Errors
     /// See [`CameraError`].
     pub fn camera(&self, size: [u32; 2]) -> Result<Camera, CameraError> {
-        Camera::look_at(self.eye, self.target, self.up, self.fov, size)
+        let pinhole = |fov: f64| Camera::look_at(self.eye, self.target, self.up, fov, size);
+        match self.camera {
+            Model::Pinhole => pinhole(self.fov),
+            Model::Orthographic => {
+                let distance = DVec3::from_array(self.eye).distance(DVec3::from_array(self.target));
+                Ok(pinhole(self.fov)?.orthographic(distance))
+            }
+            Model::Fisheye if self.fov > 0.0 && self.fov <= 360.0 => {
+                Ok(pinhole(DEFAULT_FOV)?.fisheye(self.fov))
+            }
+            Model::Fisheye => Err(CameraError::FieldOfView),
+            Model::Equirectangular => Ok(pinhole(DEFAULT_FOV)?.panorama()),
+        }
     }
 }
 
@@ -108,6 +135,7 @@ fn at(keyframes: &[Keyframe], times: &[f64], time: f64) -> Keyframe {
         target: vector(&|frame| frame.target),
         up: vector(&|frame| DVec3::from_array(frame.up).normalize_or_zero().to_array()),
         fov: spline(four.map(|frame| frame.fov), part),
+        camera: four[1].camera,
         time: Some(time),
     }
 }
@@ -131,6 +159,7 @@ mod tests {
             target: [x, 0.0, 0.0],
             up: DEFAULT_UP,
             fov: 40.0 + x,
+            camera: Model::Pinhole,
             time: None,
         }
     }
@@ -158,13 +187,30 @@ mod tests {
 
     #[test]
     fn a_camera_is_its_keyframe_again() {
-        let camera = keyframe(2.0).camera([64, 48]).expect("a camera");
-        let again = Keyframe::of(&camera, 4.0)
-            .camera([64, 48])
-            .expect("a camera");
-        for axis in 0..3 {
-            assert!((camera.eye[axis] - again.eye[axis]).abs() < 1e-12);
+        let pinhole = keyframe(2.0).camera([64, 48]).expect("a camera");
+        for camera in [
+            pinhole.orthographic(3.0),
+            pinhole.fisheye(180.0),
+            pinhole.fisheye(90.0),
+            pinhole.panorama(),
+            pinhole,
+        ] {
+            let again = Keyframe::of(&camera, 4.0)
+                .camera([64, 48])
+                .expect("a camera");
+            assert_eq!(again.model, camera.model);
+            for axis in 0..3 {
+                assert!((camera.eye[axis] - again.eye[axis]).abs() < 1e-12);
+            }
+            for axis in 0..2 {
+                assert!((camera.focal[axis] - again.focal[axis]).abs() < 1e-9);
+            }
         }
-        assert!((camera.focal[0] - again.focal[0]).abs() < 1e-9);
+        let wide = Keyframe {
+            fov: 361.0,
+            camera: Model::Fisheye,
+            ..keyframe(0.0)
+        };
+        assert_eq!(wide.camera([8, 8]), Err(CameraError::FieldOfView));
     }
 }

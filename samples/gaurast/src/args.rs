@@ -8,6 +8,7 @@ use gaurast_picture::{Background, DEFAULT_QUALITY, Size};
 use gaurast_scene::{MAX_SH_DEGREE, Transform};
 use glam::{DQuat, DVec3};
 
+use crate::heatmap::Quantity;
 use crate::renderers::OtherRenderer;
 
 /// The end of every command's help.
@@ -300,9 +301,19 @@ pub struct OutputArguments {
     #[arg(long)]
     pub depth: bool,
 
-    /// Also draw the number of Gaussians that contribute to a pixel, as the mean of each 16x16 tile
+    /// Also draw a picture of the work in each 16x16 tile, from black to white
     #[arg(long, value_name = "FILE")]
     pub heatmap: Option<PathBuf>,
+
+    /// The work that --heatmap shows
+    #[arg(
+        long,
+        value_name = "QUANTITY",
+        value_enum,
+        default_value_t,
+        requires = "heatmap"
+    )]
+    pub heatmap_of: Quantity,
 
     /// The frames per second of a video
     #[arg(long, value_name = "N", default_value_t = 30.0, value_parser = positive)]
@@ -348,7 +359,8 @@ pub enum CameraModel {
     Pinhole,
     /// An equidistant fisheye
     Fisheye,
-    /// A panorama by longitude and latitude
+    /// A panorama by longitude and latitude; also named panorama
+    #[value(alias = "panorama")]
     Equirectangular,
     /// An orthographic projection
     Orthographic,

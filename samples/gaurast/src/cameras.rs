@@ -9,6 +9,7 @@ use gaurast_scene::{DEFAULT_UP, Extent, Framing, Scene, default_angles};
 use thiserror::Error;
 
 use crate::args::{CameraArguments, CameraModel};
+use crate::drawing::short;
 use crate::sources::{Source, stem};
 
 /// The default size of pictures.
@@ -24,6 +25,8 @@ pub enum ViewError {
     CameraFile(#[from] CameraFileError),
     #[error(transparent)]
     Camera(#[from] CameraError),
+    #[error("{}: there is no view in it", path.display())]
+    NoViews { path: PathBuf },
     #[error("{}: view {view}: there are {count} views, counted from 0", path.display())]
     NoView {
         path: PathBuf,
@@ -180,11 +183,14 @@ pub fn of_scene(
     let mut views = match known {
         Known::File(mut views) => {
             for view in &mut views.views {
-                view.camera = with_near(&view.camera, &extent);
+                view.camera = with_near(&view.camera, false, &extent);
             }
             views
         }
-        Known::Path(cameras) => unnamed(cameras.iter().map(|c| with_near(c, &extent))),
+        Known::Path(cameras) => unnamed(cameras.iter().map(|camera| {
+            let inside = [Model::Fisheye, Model::Equirectangular].contains(&camera.model);
+            with_near(camera, inside || is_inside(arguments.model), &extent)
+        })),
         Known::Scene => by_hand(arguments, &extent, garden)?,
     };
     if arguments.model == CameraModel::Equirectangular && arguments.fov.is_some() {
@@ -209,25 +215,38 @@ fn unnamed(cameras: impl Iterator<Item = Camera>) -> Views {
     }
 }
 
-/// The camera with a near plane that fits a small scene.
-fn with_near(camera: &Camera, extent: &Extent) -> Camera {
-    camera.with_planes(camera.near.min(extent.near()), camera.far)
+/// True if a camera of this model sees all around it, and thus stands in the scene.
+fn is_inside(model: CameraModel) -> bool {
+    matches!(model, CameraModel::Fisheye | CameraModel::Equirectangular)
+}
+
+/// The camera with a near plane that fits a small scene, or a place inside the scene.
+fn with_near(camera: &Camera, inside: bool, extent: &Extent) -> Camera {
+    let near = if inside {
+        extent.near() / 4.0
+    } else {
+        extent.near()
+    };
+    camera.with_planes(camera.near.min(near), camera.far)
 }
 
 /// The camera with the requested model.
 fn projected(camera: &Camera, arguments: &CameraArguments, extent: &Extent) -> Camera {
-    match arguments.model {
-        CameraModel::Pinhole => camera.clone(),
-        CameraModel::Fisheye if camera.model == Model::Fisheye => camera.clone(),
-        CameraModel::Fisheye => camera.fisheye(arguments.fov.unwrap_or(FISHEYE_FOV)),
-        CameraModel::Equirectangular => camera.panorama(),
-        CameraModel::Orthographic => {
-            // The middle of the scene, or the target, has the same size as with a pinhole.
-            let middle = arguments.target.map_or(extent.centre, |target| target.0);
-            let ahead = distance_ahead(camera, middle).max(1e-6 * extent.radius());
-            let far = camera.far.min(ahead + 100.0 * extent.radius());
-            camera.orthographic(ahead).with_planes(camera.near, far)
+    let orthographic = |flat: Camera, ahead: f64| {
+        let far = camera.far.min(ahead + 100.0 * extent.radius());
+        flat.with_planes(camera.near, far)
+    };
+    // The middle of the scene, or the target, has the same size as with a pinhole.
+    let middle = arguments.target.map_or(extent.centre, |target| target.0);
+    let ahead = distance_ahead(camera, middle).max(1e-6 * extent.radius());
+    match (arguments.model, camera.model) {
+        (CameraModel::Pinhole | CameraModel::Orthographic, Model::Orthographic) => {
+            orthographic(camera.clone(), ahead)
         }
+        (CameraModel::Orthographic, _) => orthographic(camera.orthographic(ahead), ahead),
+        (CameraModel::Pinhole, _) | (CameraModel::Fisheye, Model::Fisheye) => camera.clone(),
+        (CameraModel::Fisheye, _) => camera.fisheye(arguments.fov.unwrap_or(FISHEYE_FOV)),
+        (CameraModel::Equirectangular, _) => camera.panorama(),
     }
 }
 
@@ -243,10 +262,7 @@ fn distance_ahead(camera: &Camera, point: [f64; 3]) -> f64 {
 fn by_hand(arguments: &CameraArguments, extent: &Extent, garden: bool) -> Result<Views, ViewError> {
     let size = arguments.size.map_or(DEFAULT_SIZE, |size| size.0);
     let up = arguments.up.map_or(DEFAULT_UP, |up| up.0);
-    let inside = matches!(
-        arguments.model,
-        CameraModel::Fisheye | CameraModel::Equirectangular
-    );
+    let inside = is_inside(arguments.model);
     // A field of view for a fisheye does not fit a pinhole.
     let fov = arguments.fov.filter(|_| !inside);
     let framed = arguments.azimuth.is_some()
@@ -258,7 +274,7 @@ fn by_hand(arguments: &CameraArguments, extent: &Extent, garden: bool) -> Result
     let (camera, pivot) = match (arguments.eye, arguments.target) {
         (Some(eye), Some(target)) => {
             let camera = Camera::look_at(eye.0, target.0, up, fov.unwrap_or(DEFAULT_FOV), size)?;
-            (with_near(&camera, extent), target.0)
+            (with_near(&camera, inside, extent), target.0)
         }
         _ if garden && !framed && arguments.orbit.is_none() => {
             let camera = gaurast_scene::garden::camera(fov, size)?;
@@ -284,12 +300,22 @@ fn by_hand(arguments: &CameraArguments, extent: &Extent, garden: bool) -> Result
             };
             let camera = framing.camera(&around)?;
             let (azimuth, elevation) = default_angles();
-            said = Some(format!(
-                "framed by --azimuth {:.1} --elevation {:.1} --distance {:.4}",
+            let placed = format!(
+                "framed by --azimuth {:.1} --elevation {:.1} --distance {}",
                 arguments.azimuth.unwrap_or(azimuth),
                 arguments.elevation.unwrap_or(elevation),
-                distance_ahead(&camera, around.centre),
-            ));
+                short(distance_ahead(&camera, around.centre)),
+            );
+            let given = [
+                ("--target", arguments.target.map(|target| triple(target.0))),
+                ("--up", arguments.up.map(|up| triple(up.0))),
+                ("--fov", fov.map(|fov| fov.to_string())),
+                ("--zoom", arguments.zoom.map(|zoom| zoom.to_string())),
+            ];
+            let given = given
+                .into_iter()
+                .filter_map(|(name, value)| Some(format!(" {name} {}", value?)));
+            said = Some(given.fold(placed, |said, option| said + &option));
             (camera, around.centre)
         }
     };
@@ -309,7 +335,7 @@ fn by_hand(arguments: &CameraArguments, extent: &Extent, garden: bool) -> Result
 
 /// Three numbers in the form of an option's value.
 fn triple(values: [f64; 3]) -> String {
-    values.map(|value| format!("{value:.4}")).join(",")
+    values.map(|value| short(value).to_string()).join(",")
 }
 
 fn path_cameras(
@@ -347,13 +373,14 @@ fn choose(
         view: view.to_owned(),
         count,
     };
+    if count == 0 {
+        return Err(ViewError::NoViews {
+            path: path.to_owned(),
+        });
+    }
     let text = text.trim();
     if text == "all" {
-        return if count == 0 {
-            Err(no_view(text))
-        } else {
-            Ok((0..count).collect())
-        };
+        return Ok((0..count).collect());
     }
     if let Some((first, rest)) = text.split_once("..") {
         let (last, step) = rest.split_once(':').unwrap_or((rest, "1"));

@@ -234,9 +234,9 @@ impl Drawing {
     }
 }
 
-/// A number with four significant digits.
-fn short(number: f64) -> f64 {
-    format!("{number:.3e}").parse().unwrap_or(number)
+/// A number with five significant digits.
+pub fn short(number: f64) -> f64 {
+    format!("{number:.4e}").parse().unwrap_or(number)
 }
 
 /// The reason for which the picture is empty, if it is, with counts of the skipped Gaussians.

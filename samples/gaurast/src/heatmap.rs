@@ -1,20 +1,52 @@
-//! A picture of the number of Gaussians that contribute to each pixel.
+//! A picture of the work in each tile: the Gaussians that contribute to a pixel, or the cycles of a rasterizer module.
 //!
-//! The numbers come from the device's trace of work (`GAURAST_TRACE`). The trace has one number per tile, so a tile has
-//! one colour, that of its pixels' mean.
+//! The numbers come from the device's trace of work (`GAURAST_TRACE`), which has them by tile, so a tile has one colour.
+//! The time that this processor needs for a tile is not shown: it changes from run to run. The modelled hardware's
+//! cycles are the same each time.
 
 use std::path::{Path, PathBuf};
 
+use clap::ValueEnum;
 use gaurast_picture::{OutputError, Picture};
 use gaurast_scene::Camera;
 use tempfile::TempDir;
 use thiserror::Error;
-use timing::work::{TILE_SIDE, Trace};
+use timing::config::{Config, ConfigError, DEFAULT_PRESET};
+use timing::fast;
+use timing::work::{FrameWork, TILE_SIDE, Trace};
 
 /// The variable that makes the device write a trace.
 const TRACE: &str = "GAURAST_TRACE";
 
-/// A failure to make the picture of the counts. Displayed as one sentence.
+/// The quantity that is drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Quantity {
+    /// The number of Gaussians that contribute to a pixel, as the mean of each tile
+    #[default]
+    Gaussians,
+    /// The cycles that each tile spends in a rasterizer module of the paper's hardware, by the timing model
+    Cycles,
+}
+
+impl Quantity {
+    /// The unit of the numbers.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Gaussians => "Gaussians a pixel",
+            Self::Cycles => "cycles a tile",
+        }
+    }
+
+    /// The name in JSON.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Gaussians => "gaussians",
+            Self::Cycles => "cycles",
+        }
+    }
+}
+
+/// A failure to make the picture of the work. Displayed as one sentence.
 #[derive(Debug, Error)]
 pub enum HeatmapError {
     #[error("{}: {source}", path.display())]
@@ -26,6 +58,8 @@ pub enum HeatmapError {
     NoTrace { path: PathBuf },
     #[error("{}: it is there already: --force replaces it", path.display())]
     There { path: PathBuf },
+    #[error(transparent)]
+    Config(#[from] ConfigError),
     #[error(transparent)]
     Output(#[from] OutputError),
 }
@@ -42,12 +76,17 @@ pub fn trace_from_now_on() -> std::io::Result<Option<TempDir>> {
     Ok(Some(folder))
 }
 
-/// Writes the picture of the last frame that the device drew, after the device is destroyed; returns the greatest
-/// count.
+/// Writes the picture of a `quantity` of the last frame that the device drew, after the device is destroyed; returns the
+/// greatest value of a tile.
 ///
 /// # Errors
 /// See [`HeatmapError`].
-pub fn write(path: &Path, camera: &Camera, force: bool) -> Result<f64, HeatmapError> {
+pub fn write(
+    path: &Path,
+    quantity: Quantity,
+    camera: &Camera,
+    force: bool,
+) -> Result<f64, HeatmapError> {
     if path.is_file() && !force {
         return Err(HeatmapError::There {
             path: path.to_owned(),
@@ -64,33 +103,56 @@ pub fn write(path: &Path, camera: &Camera, force: bool) -> Result<f64, HeatmapEr
         .frames
         .last()
         .ok_or_else(|| HeatmapError::NoTrace { path: file.clone() })?;
-    let tiles = frame.draws.iter().flat_map(|draw| &draw.tiles);
-    let counts = tiles.map(|tile| (tile.at, tile.contributions));
-    let (picture, greatest) = picture([camera.width, camera.height], counts);
+    let size = [camera.width, camera.height];
+    let (picture, greatest) = match quantity {
+        Quantity::Gaussians => picture(size, true, contributions(frame)),
+        Quantity::Cycles => picture(size, false, cycles(frame)?),
+    };
     gaurast_picture::write(path, &picture, None)?;
     Ok(greatest)
 }
 
-/// The picture of the contributions by tile (column and row), and the greatest mean.
+/// The pairs of a pixel and a Gaussian that changed it, by tile (column and row).
+fn contributions(frame: &FrameWork) -> Vec<([u32; 2], f64)> {
+    let tiles = frame.draws.iter().flat_map(|draw| &draw.tiles);
+    tiles
+        .map(|tile| (tile.at, tile.contributions as f64))
+        .collect()
+}
+
+/// The cycles that each tile spends in a module of the default hardware, by the timing model.
+fn cycles(frame: &FrameWork) -> Result<Vec<([u32; 2], f64)>, ConfigError> {
+    let config = Config::preset(DEFAULT_PRESET, &[])?;
+    let (_, spans) = fast::rasterize_tiles(frame, &config, 0.0);
+    Ok(spans
+        .iter()
+        .map(|span| (span.at, span.end - span.begin))
+        .collect())
+}
+
+/// The picture of values by tile (column and row), and the greatest value. With `per_pixel` a tile's sum is divided by
+/// its pixels.
 fn picture(
     [width, height]: [u32; 2],
-    tiles: impl Iterator<Item = ([u32; 2], u64)>,
+    per_pixel: bool,
+    tiles: impl IntoIterator<Item = ([u32; 2], f64)>,
 ) -> (Picture, f64) {
     let columns = width.div_ceil(TILE_SIDE);
-    let mut counts = vec![0; (columns * height.div_ceil(TILE_SIDE)) as usize];
-    for ([column, row], contributions) in tiles {
-        if let Some(count) = counts.get_mut((row * columns + column) as usize) {
-            *count += contributions;
+    let mut sums = vec![0.0; (columns * height.div_ceil(TILE_SIDE)) as usize];
+    for ([column, row], value) in tiles {
+        if let Some(sum) = sums.get_mut((row * columns + column) as usize) {
+            *sum += value;
         }
     }
-    let mean = |index: usize| {
+    let value = |index: usize| {
         let (column, row) = (index as u32 % columns, index as u32 / columns);
         let across = TILE_SIDE.min(width - column * TILE_SIDE);
         let down = TILE_SIDE.min(height - row * TILE_SIDE);
-        counts[index] as f64 / f64::from(across * down)
+        let pixels = if per_pixel { across * down } else { 1 };
+        sums[index] / f64::from(pixels)
     };
-    let means: Vec<f64> = (0..counts.len()).map(mean).collect();
-    let greatest = means.iter().copied().fold(0.0, f64::max);
+    let values: Vec<f64> = (0..sums.len()).map(value).collect();
+    let greatest = values.iter().copied().fold(0.0, f64::max);
     let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
     let picture = Picture {
         width,
@@ -98,7 +160,7 @@ fn picture(
         pixels: pixels
             .map(|(x, y)| {
                 let index = (y / TILE_SIDE * columns + x / TILE_SIDE) as usize;
-                let [r, g, b] = heat((means[index] / greatest.max(f64::MIN_POSITIVE)) as f32);
+                let [r, g, b] = heat((values[index] / greatest.max(f64::MIN_POSITIVE)) as f32);
                 [r, g, b, 1.0]
             })
             .collect(),
@@ -124,17 +186,62 @@ pub fn heat(part: f32) -> [f32; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use timing::work::{DrawWork, Mode, Run, TileWork};
 
     #[test]
     fn tiles_are_as_bright_as_they_are_full() {
         // Two tiles of 16x16 and two of 4x16: 256 and 64 pixels.
-        let tiles = [([0, 0], 512), ([1, 1], 640)];
-        let (picture, greatest) = picture([20, 32], tiles.into_iter());
-        assert_eq!(greatest, 10.0);
-        assert_eq!(picture.pixels[20 * 31 + 19], [1.0; 4]);
-        assert_eq!(picture.pixels[19], [0.0, 0.0, 0.0, 1.0]);
-        let [r, g, b] = heat(0.2);
-        assert_eq!(picture.pixels[0], [r, g, b, 1.0]);
+        let tiles = [([0, 0], 512.0), ([1, 1], 640.0)];
+        let [(means, ten), (sums, all)] =
+            [true, false].map(|per_pixel| picture([20, 32], per_pixel, tiles));
+        assert_eq!([ten, all], [10.0, 640.0]);
+        for (picture, share) in [(means, 0.2), (sums, 0.8)] {
+            assert_eq!(picture.pixels[20 * 31 + 19], [1.0; 4]);
+            assert_eq!(picture.pixels[19], [0.0, 0.0, 0.0, 1.0]);
+            let [r, g, b] = heat(share);
+            assert_eq!(picture.pixels[0], [r, g, b, 1.0]);
+        }
+    }
+
+    /// A tile's cycles are those that it costs by the paper's numbers: 16 PEs take 16 pixels a cycle.
+    #[test]
+    fn cycles_grow_with_the_list_of_a_tile() {
+        let tile = |column: u32, primitives: u32| TileWork {
+            at: [column, 0],
+            listed: primitives,
+            runs: vec![Run {
+                primitives,
+                rows: 16,
+                blocks: 16,
+                reached: 16 * primitives,
+                ..Run::default()
+            }],
+            ..TileWork::default()
+        };
+        let draw = DrawWork {
+            tiles: vec![tile(0, 1000), tile(1, 3000)],
+            ..DrawWork::default()
+        };
+        let frame = FrameWork {
+            size: [48, 16],
+            draws: vec![draw],
+            ..FrameWork::default()
+        };
+        let tiles = cycles(&frame).expect("the default hardware");
+        let of = |column: u32| {
+            let found = tiles.iter().find(|(at, _)| *at == [column, 0]);
+            found.map_or(0.0, |(_, cycles)| *cycles)
+        };
+        let rasterizer = Config::preset(DEFAULT_PRESET, &[])
+            .expect("the default hardware")
+            .rasterizer;
+        let busy = rasterizer.busy_cycles(Mode::Gaussian, 16) as f64;
+        assert!(
+            of(0) >= 1000.0 * busy && of(1) >= 3000.0 * busy,
+            "{tiles:?}"
+        );
+        assert!((of(1) - of(0)) < 2100.0 * busy, "{tiles:?}");
+        assert_eq!(of(2), 0.0);
     }
 
     #[test]

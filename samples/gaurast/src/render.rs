@@ -117,6 +117,7 @@ pub fn run(arguments: &RenderArguments) -> Result<(), Error> {
     let heat = match (&arguments.output.heatmap, indices.first()) {
         (Some(path), Some(index)) => Some(heatmap::write(
             path,
+            arguments.output.heatmap_of,
             &views[*index].camera,
             arguments.output.force,
         )?),
@@ -133,7 +134,8 @@ pub fn run(arguments: &RenderArguments) -> Result<(), Error> {
         outputs: &outputs,
         framing: framing.as_deref(),
         notes: &notes,
-        heatmap: arguments.output.heatmap.as_deref().zip(heat),
+        heatmap: (arguments.output.heatmap.as_deref().zip(heat))
+            .map(|(path, greatest)| (path, arguments.output.heatmap_of, greatest)),
         stats: arguments.report.stats || arguments.report.counters,
     };
     if quiet && !arguments.report.json {

@@ -13,6 +13,7 @@ use serde_json::json;
 
 use crate::cameras::View;
 use crate::drawing::Drawn;
+use crate::heatmap::Quantity;
 use crate::outputs::Outputs;
 
 /// The contents of a scene, in numbers.
@@ -51,7 +52,7 @@ pub struct Summary<'a> {
     pub framing: Option<&'a str>,
     pub notes: &'a [String],
     /// The file of the picture of the counts, and the greatest count.
-    pub heatmap: Option<(&'a Path, f64)>,
+    pub heatmap: Option<(&'a Path, Quantity, f64)>,
     /// True if tables are requested.
     pub stats: bool,
 }
@@ -70,10 +71,11 @@ impl Summary<'_> {
             text += &format!("; {framing}");
         }
         text.push('\n');
-        if let Some((path, greatest)) = self.heatmap {
+        if let Some((path, quantity, greatest)) = self.heatmap {
             text += &format!(
-                "wrote {}: 0 (black) to {greatest:.1} (white) Gaussians a pixel\n",
-                path.display()
+                "wrote {}: 0 (black) to {greatest:.1} (white) {}\n",
+                path.display(),
+                quantity.unit()
             );
         }
         text
@@ -192,7 +194,9 @@ impl Summary<'_> {
             "kept": self.kept,
             "framing": self.framing,
             "notes": self.notes,
-            "heatmap": self.heatmap.map(|(path, greatest)| json!({"file": path, "greatest": greatest})),
+            "heatmap": self.heatmap.map(|(path, quantity, greatest)| {
+                json!({"file": path, "of": quantity.name(), "greatest": greatest})
+            }),
             "pictures": pictures,
         })
     }

@@ -94,7 +94,7 @@ pub fn read_with(
     Input::new(reader, len, Origin { path, options })
         .unpacked(|input| {
             let format = choose(path, input.peek()?)
-                .ok_or_else(|| Reason::UnknownFormat(known_extensions()).at(Place::File))?;
+                .ok_or_else(|| Reason::UnknownFormat(known_to_user(path)).at(Place::File))?;
             log::debug!("reading {} as {}", path.display(), format.name());
             format.load(input)
         })
@@ -165,11 +165,28 @@ fn choose(path: &Path, start: &[u8]) -> Option<&'static dyn Format> {
     by_extension.or_else(by_magic).copied()
 }
 
+/// The extensions of all formats with a reader, for the message that the format of `path` is unknown. Without an
+/// extension, as on standard input, some formats can't be recognized.
+fn known_to_user(path: &Path) -> String {
+    let all = known_extensions();
+    if path.extension().is_some() {
+        return all;
+    }
+    let unmarked = extensions_of(|format| format.magic().is_none());
+    format!("{all}; of these, {unmarked} are known by the names of their files alone")
+}
+
 /// The extensions of all formats with a reader, for messages.
 pub fn known_extensions() -> String {
+    extensions_of(|_| true)
+}
+
+/// The extensions of the formats with a reader that are `chosen`, with commas between them.
+fn extensions_of(chosen: impl Fn(&dyn Format) -> bool) -> String {
     FORMATS
         .iter()
-        .filter(|format| format.is_read())
+        .copied()
+        .filter(|format| format.is_read() && chosen(*format))
         .flat_map(|format| format.extensions())
         .map(|extension| format!(".{extension}"))
         .collect::<Vec<_>>()

@@ -267,52 +267,6 @@ fn nodes_move_gaussians_and_their_colours() {
     close(&scene.shapes()[1].scale, &[0.4, 1.5, 0.6], 1e-6);
 }
 
-/// Replaces elements of the positions' accessor: their numbers as bytes, and their values.
-fn replace_positions(file: &mut Builder, numbers: &[u8], values: &[f32]) {
-    let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
-    let (indices, values) = (file.view(numbers), file.view(&bytes));
-    file.document["accessors"][0]["sparse"] = json!({
-        "count": numbers.len(), "indices": {"bufferView": indices, "componentType": 5121},
-        "values": {"bufferView": values},
-    });
-}
-
-#[gaurast_runner::test]
-fn sparse_accessors_replace_elements() {
-    let plain = Builder::new().load();
-    let other = [7.0, 8.0, 9.0];
-    let mut file = Builder::new();
-    replace_positions(&mut file, &[1], &other);
-    let scene = file.load();
-    assert_eq!(scene.positions()[0], plain.positions()[0]);
-    assert_eq!(scene.positions()[1], [7.0, -8.0, -9.0]);
-    // Without a buffer view, the others are zeros.
-    let mut file = Builder::new();
-    file.document["accessors"][0]["bufferView"] = json!(null);
-    replace_positions(&mut file, &[1], &other);
-    let zeros = file.load();
-    assert_eq!(zeros.positions(), [[0.0; 3], [7.0, -8.0, -9.0]]);
-
-    let mut file = Builder::new();
-    replace_positions(&mut file, &[2], &other);
-    let (place, reason) = file.refusal();
-    let part = "mesh 0, primitive 0, POSITION, sparse.indices";
-    assert_eq!(place, Place::Part(part.to_owned()));
-    assert!(matches!(reason, Reason::Unsupported(_)), "{reason}");
-    let mut file = Builder::new();
-    replace_positions(&mut file, &[0, 1], &other);
-    assert!(matches!(file.refusal().1, Reason::TooShort { .. }));
-    let mut file = Builder::new();
-    replace_positions(&mut file, &[1], &other);
-    file.document["accessors"][0]["sparse"]["indices"]["componentType"] = json!(5126);
-    assert!(matches!(file.refusal().1, Reason::Type { .. }));
-    let mut file = Builder::new();
-    file.document["accessors"][0]["bufferView"] = json!(null);
-    file.document["accessors"][0]["count"] = json!(1_u64 << 40);
-    replace_positions(&mut file, &[1], &other);
-    assert!(matches!(file.refusal().1, Reason::Unsupported(_)));
-}
-
 #[gaurast_runner::test]
 fn what_gltf_says_is_told_or_refused() {
     let mut file = Builder::new();
@@ -386,10 +340,6 @@ fn what_gltf_says_is_told_or_refused() {
         refused(|f| f.document["bufferViews"][0]["byteLength"] = json!(1_u64 << 40)),
         Reason::TooShort { .. }
     ));
-    assert!(matches!(
-        refused(|f| f.document["accessors"][0]["bufferView"] = json!(null)),
-        Reason::Unsupported(_)
-    ));
     let name = "KHR_gaussian_splatting:SH_DEGREE_1_COEF_1";
     let mut file = Builder::new();
     file.primitive()["attributes"]
@@ -409,6 +359,133 @@ fn what_gltf_says_is_told_or_refused() {
         .expect("primitives");
     primitives.push(json!({"mode": 1, "attributes": {"POSITION": 0}}));
     assert_eq!(file.load().metadata().notes.len(), 1);
+}
+
+/// A valid binary file with sparse positions that have no data of their own.
+pub fn sparse_glb() -> Vec<u8> {
+    let mut file = sparse((5123, 2), &[1], &[7.0, 8.0, 9.0]);
+    let accessor = file.document["accessors"][0].as_object_mut();
+    accessor.expect("an object").remove("bufferView");
+    file.glb()
+}
+
+/// A file of which sparse `values` replace the positions of `indices`, which have a type.
+fn sparse((kind, size): (u32, usize), indices: &[i32], values: &[f32]) -> Builder {
+    let mut file = Builder::new();
+    let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+    // The elements that replace others need not begin a view.
+    let indices_view = file.view(&[&[0; 4][..], &whole(size, indices)].concat());
+    let values_view = file.view(&[&[0; 8][..], &bytes].concat());
+    let sparse = json!({
+        "count": indices.len(),
+        "indices": {"bufferView": indices_view, "byteOffset": 4, "componentType": kind},
+        "values": {"bufferView": values_view, "byteOffset": 8},
+    });
+    file.document["accessors"][0]["sparse"] = sparse;
+    file
+}
+
+#[gaurast_runner::test]
+fn sparse_accessors_of_gltf_replace_elements() {
+    const REPLACED: [f32; 3] = [7.0, 8.0, 9.0];
+    for kind in [(5121, 1), (5123, 2), (5125, 4)] {
+        let scene = sparse(kind, &[1], &REPLACED).load();
+        assert_eq!(scene.positions(), [[1.0, -2.0, -3.0], [7.0, -8.0, -9.0]]);
+        // Elements without data are zeros.
+        let mut file = sparse(kind, &[1], &REPLACED);
+        let accessor = file.document["accessors"][0].as_object_mut();
+        accessor.expect("an object").remove("bufferView");
+        let scene = file.load();
+        assert_eq!(scene.positions(), [[0.0; 3], [7.0, -8.0, -9.0]]);
+    }
+    let mut file = Builder::new();
+    let accessor = file.document["accessors"][5].as_object_mut();
+    accessor.expect("an object").remove("bufferView");
+    let scene = file.load();
+    assert_eq!([scene.sh()[1], scene.sh()[5]], [[0.0; 3]; 2]);
+    assert_ne!(scene.sh()[2], [0.0; 3]);
+
+    let part = |part: &str| Place::Part(format!("mesh 0, primitive 0, POSITION{part}"));
+    let two = [REPLACED, REPLACED].concat();
+    for (indices, message) in [
+        (&[2][..], "element 2 is not one of the accessor's 2"),
+        (&[1, 0], "they must grow, and 0 follows 1"),
+        (&[1, 1], "they must grow, and 1 follows 1"),
+    ] {
+        let values = &two[..3 * indices.len()];
+        let (place, reason) = sparse((5121, 1), indices, values).refusal();
+        assert_eq!(place, part(", sparse, indices"));
+        assert_eq!(reason.to_string(), message);
+    }
+    let (place, reason) = sparse((5126, 4), &[1], &REPLACED).refusal();
+    assert_eq!(place, part(", sparse, indices"));
+    assert!(matches!(reason, Reason::Type { .. }));
+    let (place, reason) = sparse((5121, 1), &[0, 1], &REPLACED).refusal();
+    assert_eq!(place, part(", sparse, values"));
+    assert!(matches!(reason, Reason::TooShort { .. }));
+    // Zeros take no bytes of the file, and still don't take all memory.
+    let mut file = Builder::new();
+    file.document["accessors"][0] =
+        json!({"componentType": 5126, "count": 1_u64 << 40, "type": "VEC3"});
+    let (place, reason) = file.refusal();
+    assert_eq!(place, part(""));
+    assert!(reason.to_string().contains("1099511627776 elements"));
+}
+
+/// Tests that what is compressed by an extension is read from the buffer for other readers, if there is one.
+#[gaurast_runner::test]
+fn compressed_gltf_is_refused_by_the_name_of_its_extension() {
+    for extension in ["EXT_meshopt_compression", "KHR_meshopt_compression"] {
+        let mut file = Builder::new();
+        file.document["bufferViews"][0]["extensions"][extension] = json!({"buffer": 0});
+        assert_eq!(file.load().positions()[0], [1.0, -2.0, -3.0]);
+
+        let mut file = Builder::new();
+        let buffers = file.document["buffers"].as_array_mut().expect("buffers");
+        buffers.push(json!({"byteLength": 24, "extensions": {extension: {"fallback": true}}}));
+        file.document["bufferViews"][0]["extensions"][extension] = json!({"buffer": 0});
+        file.document["bufferViews"][0]["buffer"] = json!(1);
+        let (place, reason) = file.refusal();
+        let expected = "mesh 0, primitive 0, POSITION, bufferView";
+        assert_eq!(place, Place::Part(expected.to_owned()));
+        let expected = format!("its data is compressed by {extension:?}, which is not read");
+        assert_eq!(reason.to_string(), expected);
+    }
+    for extension in [
+        "EXT_meshopt_compression",
+        "KHR_meshopt_compression",
+        "KHR_draco_mesh_compression",
+    ] {
+        let mut file = Builder::new();
+        file.document["extensionsRequired"] = json!([extension]);
+        let (place, reason) = file.refusal();
+        assert_eq!(place, Place::Part("extensionsRequired".to_owned()));
+        let expected = format!("the extension {extension:?} is required and not read");
+        assert_eq!(reason.to_string(), expected);
+    }
+    const DRACO: &str = "KHR_draco_mesh_compression";
+    let mut file = Builder::new();
+    *file.primitive() = json!({
+        "attributes": {"POSITION": 0}, "indices": 1,
+        "extensions": {DRACO: {"bufferView": 0, "attributes": {"POSITION": 0}}},
+    });
+    file.document["accessors"][1] = json!({"componentType": 5121, "count": 3, "type": "SCALAR"});
+    let (place, reason) = file.refusal();
+    assert_eq!(place, Place::Part("mesh 0, primitive 0".to_owned()));
+    assert!(reason.to_string().contains(DRACO), "{reason}");
+}
+
+#[gaurast_runner::test]
+fn the_default_scene_of_gltf_is_read() {
+    let mut file = Builder::new();
+    file.document["scenes"] = json!([{"nodes": []}, {"nodes": [0]}, {"nodes": []}]);
+    file.document["scene"] = json!(1);
+    // Extensions of textures concern nothing that is read.
+    file.document["extensionsRequired"] = json!(["EXT_texture_webp", "KHR_mesh_quantization"]);
+    let scene = file.load();
+    assert_eq!(scene.len(), 2);
+    let note = "scenes other than the default one are ignored: 2";
+    assert_eq!(scene.metadata().notes, [note]);
 }
 
 #[gaurast_runner::test]

@@ -104,6 +104,11 @@ fn formats_that_are_not_read_and_unknown_ones_are_named() {
     let error = read("a.txt", b"hello").expect_err("unknown");
     assert!(matches!(error, SceneError::UnknownFormat { .. }));
     assert!(error.to_string().contains(".splat"), "{error}");
+    // Without a name, some formats cannot be told.
+    let error = read("standard input", b"hello").expect_err("unknown");
+    let hint =
+        "of these, .splat, .ksplat, .json, .gltf are known by the names of their files alone";
+    assert!(error.to_string().contains(hint), "{error}");
     let (properties, rows) = distinct(0, 1);
     let file = ply(Encoding::Little, &properties, &rows);
     assert_eq!(
@@ -135,6 +140,7 @@ fn good_files() -> Vec<(&'static str, Vec<u8>)> {
         ("a.sog", sog::archive(2)),
         ("1.sog", sog::archive(1)),
         ("a.glb", gltf::glb()),
+        ("a.glb", gltf::sparse_glb()),
         ("a.gltf", gltf::gltf()),
         ("mesh.ply", meshes::binary(false)),
         ("mesh.glb", meshes::glb()),

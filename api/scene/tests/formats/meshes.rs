@@ -3,7 +3,7 @@
 use gaurast_runner::{Need, data};
 use gaurast_scene::{Mesh, Place, Reason, Scene, Transform};
 use glam::{DQuat, DVec3};
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::support::*;
 
@@ -55,6 +55,11 @@ pub fn binary(big_endian: bool) -> Vec<u8> {
 
 /// A binary glTF file: a strip of two triangles, with linear colours of a material, moved by its node.
 fn strip(mode: u32, indices: &[u16]) -> Vec<u8> {
+    strip_with(mode, indices, |_| {})
+}
+
+/// The same file after a change of its document.
+fn strip_with(mode: u32, indices: &[u16], change: impl FnOnce(&mut Value)) -> Vec<u8> {
     let strip = [CORNERS[0], CORNERS[1], CORNERS[3], CORNERS[2]];
     let mut bytes: Vec<u8> = strip
         .as_flattened()
@@ -63,7 +68,7 @@ fn strip(mode: u32, indices: &[u16]) -> Vec<u8> {
         .collect();
     let at = bytes.len();
     bytes.extend(indices.iter().flat_map(|index| index.to_le_bytes()));
-    let document = json!({
+    let mut document = json!({
         "asset": {"version": "2.0"}, "nodes": [{"mesh": 0, "translation": [10, 0, 0]}],
         "meshes": [{"primitives": [{"mode": mode, "attributes": {"POSITION": 0}, "indices": 1, "material": 0}]}],
         "materials": [{"pbrMetallicRoughness": {"baseColorFactor": [1.0, 0.21404114, 0.0, 1.0],
@@ -78,6 +83,7 @@ fn strip(mode: u32, indices: &[u16]) -> Vec<u8> {
         ],
         "buffers": [{"byteLength": bytes.len()}],
     });
+    change(&mut document);
     let mut json = document.to_string().into_bytes();
     json.resize(json.len().next_multiple_of(4), b' ');
     let mut file = b"glTF".to_vec();
@@ -170,6 +176,19 @@ fn triangles_of_gltf_files_are_in_the_scenes_frame() {
     assert_eq!(positions(list.mesh()), [0, 1, 3].map(at));
     let fan = read("a.glb", &strip(6, &[0, 1, 3, 2])).expect("a good file");
     assert_eq!(positions(fan.mesh()), [0, 1, 2, 0, 2, 3].map(at));
+    // The same file with a sparse accessor of its indices: the second and the third are replaced by 3 and 0.
+    let sparse = strip_with(4, &[0, 1, 2, 3, 0], |document| {
+        document["accessors"][1] = json!({
+            "bufferView": 1, "componentType": 5123, "count": 3, "type": "SCALAR",
+            "sparse": {
+                "count": 2,
+                "indices": {"bufferView": 1, "byteOffset": 2, "componentType": 5123},
+                "values": {"bufferView": 1, "byteOffset": 6},
+            },
+        });
+    });
+    let list = read("a.glb", &sparse).expect("a good file");
+    assert_eq!(positions(list.mesh()), [0, 2, 0].map(at));
     let (place, reason) = refusal("a.glb", &strip(4, &[0, 1, 9]));
     assert_eq!(
         place,

@@ -281,6 +281,50 @@ fn sides_distances_and_models() {
     assert!(g > 4.0 * r, "the same as asked for before: {r} {g}");
 }
 
+/// Tests that a keyframe has its camera's model, and an orthographic one its scale.
+#[gaurast_runner::test]
+fn keyframes_of_all_models_are_their_pictures() {
+    let folder = folder();
+    // A panorama shows all, so that it has nothing to magnify.
+    for (model, zoom) in [
+        ("pinhole", "1.5"),
+        ("orthographic", "1.5"),
+        ("fisheye", "1.5"),
+        ("panorama", "1"),
+    ] {
+        let view = [
+            "two.ply",
+            "--azimuth",
+            "45",
+            "--camera",
+            model,
+            "--zoom",
+            zoom,
+            "--size",
+            "64x48",
+        ];
+        let printed = succeeds(&folder, &[&view[..], &["--frame"]].concat());
+        std::fs::write(folder.path().join("keys.json"), printed).expect("written");
+        let drawn = [&view[..], &["-o", "a.png", "--force"]].concat();
+        let said = succeeds(&folder, &drawn);
+        assert!(model == "fisheye" || model == "panorama" || said.contains("--zoom 1.5"));
+        let path = [
+            "two.ply",
+            "--path",
+            "keys.json",
+            "--size",
+            "64x48",
+            "-o",
+            "b.png",
+        ];
+        succeeds(&folder, &[&path[..], &["--force"]].concat());
+        succeeds(
+            &folder,
+            &["compare", "a.png", "b.png", "--fail-below", "45"],
+        );
+    }
+}
+
 #[gaurast_runner::test]
 fn an_orbit_is_numbered_shared_and_goes_on() {
     let folder = folder();
@@ -727,19 +771,35 @@ fn a_sheet_shows_eight_sides() {
 }
 
 #[gaurast_runner::test]
-fn counts_a_pixel_are_drawn() {
+fn the_work_of_tiles_is_drawn() {
     let folder = folder();
-    let arguments = ["two.ply", "--size", "64x48", "--heatmap", "h.png", "--json"];
-    let json: serde_json::Value =
-        serde_json::from_str(&succeeds(&folder, &arguments)).expect("JSON");
+    let heatmap = |file: &str, more: &[&str]| -> serde_json::Value {
+        let arguments = ["two.ply", "--size", "64x48", "--heatmap", file, "--json"];
+        let arguments = [&arguments[..], &["--force"], more].concat();
+        serde_json::from_str(&succeeds(&folder, &arguments)).expect("JSON")
+    };
+    let json = heatmap("h.png", &[]);
     let greatest = json["heatmap"]["greatest"].as_f64().expect("a number");
     assert!(greatest > 0.5 && greatest <= 2.0, "{json}");
+    assert_eq!(json["heatmap"]["of"], "gaussians");
     assert_eq!(json["gaussians"], 2);
     assert_eq!(json["pictures"][0]["files"][0], "two.png");
-    let heat = image::open(folder.path().join("h.png"))
-        .expect("a picture")
-        .to_rgb8();
-    assert!(heat.pixels().any(|pixel| pixel.0 == [255; 3]));
+    // A tile of 256 pixels takes its module's 16 PEs 16 cycles at least, and the picture is the same each time.
+    let json = heatmap("c.png", &["--heatmap-of", "cycles"]);
+    let greatest = json["heatmap"]["greatest"].as_f64().expect("a number");
+    assert!((16.0..10_000.0).contains(&greatest), "{json}");
+    assert_eq!(json["heatmap"]["of"], "cycles");
+    heatmap("again.png", &["--heatmap-of", "cycles"]);
+    let read = |file: &str| {
+        let picture = image::open(folder.path().join(file)).expect("a picture");
+        picture.to_rgb8()
+    };
+    assert_eq!(read("c.png"), read("again.png"));
+    for file in ["h.png", "c.png"] {
+        assert!(read(file).pixels().any(|pixel| pixel.0 == [255; 3]));
+    }
+    let alone = gaurast(folder.path(), &["two.ply", "--heatmap-of", "cycles"]);
+    assert_eq!(alone.status.code(), Some(2));
 }
 
 #[gaurast_runner::test]

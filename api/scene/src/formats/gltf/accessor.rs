@@ -63,6 +63,16 @@ impl Component {
         }
     }
 
+    /// Decodes the index that begins `bytes`.
+    #[inline]
+    fn index(self, bytes: &[u8]) -> u32 {
+        match self.size() {
+            1 => bytes[0].into(),
+            2 => u16::from_le_bytes([bytes[0], bytes[1]]).into(),
+            _ => u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]),
+        }
+    }
+
     /// The name in messages.
     fn name(self) -> String {
         let kind = match self.kind {
@@ -92,6 +102,17 @@ pub(super) struct Demand {
     pub(super) expected: &'static str,
 }
 
+/// Indices, of vertices and of elements.
+const INDEX: Demand = Demand {
+    width: 1,
+    components: &[
+        Component::plain(UNSIGNED_BYTE),
+        Component::plain(UNSIGNED_SHORT),
+        Component::plain(UNSIGNED_INT),
+    ],
+    expected: "unsigned byte, short or int",
+};
+
 /// The values of accessor `index`, element after element. Messages name it `place`.
 pub(super) fn values(
     buffers: &mut Buffers<'_>,
@@ -108,34 +129,11 @@ pub(super) fn indices(
     index: usize,
     place: &str,
 ) -> Result<Vec<u32>, Fault> {
-    decoded(buffers, index, &INDEX, place, decode_index)
+    decoded(buffers, index, &INDEX, place, Component::index)
 }
-
-/// The types of indices.
-const INDEX: Demand = Demand {
-    width: 1,
-    components: &[
-        Component::plain(UNSIGNED_BYTE),
-        Component::plain(UNSIGNED_SHORT),
-        Component::plain(UNSIGNED_INT),
-    ],
-    expected: "unsigned byte, short or int",
-};
-
-/// The index that begins `bytes`.
-fn decode_index(component: Component, bytes: &[u8]) -> u32 {
-    match component.size() {
-        1 => bytes[0].into(),
-        2 => u16::from_le_bytes([bytes[0], bytes[1]]).into(),
-        _ => u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]),
-    }
-}
-
-/// The most elements of an accessor without a buffer view, which are zeros. A small file could claim any number.
-const MOST_ZEROS: usize = 1 << 24;
 
 /// The components of accessor `index`, element after element, each decoded by `decode` from the bytes that it begins.
-fn decoded<T>(
+fn decoded<T: Copy + Default>(
     buffers: &mut Buffers<'_>,
     index: usize,
     demand: &Demand,
@@ -166,123 +164,138 @@ fn decoded<T>(
         let (found, expected) = (component.name(), demand.expected);
         return Err(at(Reason::Type { found, expected }));
     }
-    let size = demand.width * component.size();
-    let len = accessor.count.saturating_mul(demand.width);
-    let mut values = Vec::new();
-    let reserve = |values: &mut Vec<T>| {
-        let reserved = values.try_reserve_exact(len);
-        reserved.map_err(|_| at(Reason::Memory(4 * len as u64)))
-    };
-    match (accessor.buffer_view, &accessor.sparse) {
-        (Some(view), _) => {
-            let elements = Elements {
+    let count = accessor.count;
+    let mut values = match accessor.buffer_view {
+        Some(view) => {
+            let run = Run {
                 view,
-                byte_offset: accessor.byte_offset,
-                count: accessor.count,
-                size,
+                offset: accessor.byte_offset,
+                count,
+                component,
+                width: demand.width,
             };
-            let elements = elements.of(buffers, place)?;
-            reserve(&mut values)?;
-            for element in elements {
-                let parts = element.chunks(component.size()).take(demand.width);
-                values.extend(parts.map(|part| decode(component, part)));
+            run.decoded(buffers, place, &decode)?
+        }
+        None => {
+            let available = buffers.total_bytes();
+            if count as u64 > available {
+                let text = format!(
+                    "it has no data, and {count} elements of zeros are more than the {available} bytes of all buffers"
+                );
+                return Err(at(Reason::Unsupported(text)));
             }
+            let mut zeros = reserved(count, demand.width).map_err(at)?;
+            zeros.resize(count * demand.width, T::default());
+            zeros
         }
-        // Elements that are not replaced are zeros.
-        (None, Some(_)) if accessor.count <= MOST_ZEROS => {
-            reserve(&mut values)?;
-            values.extend((0..len).map(|_| decode(component, &[0; 4])));
-        }
-        (None, Some(_)) => {
-            let text = format!("it has more than {MOST_ZEROS} elements without a buffer view");
-            return Err(at(Reason::Unsupported(text)));
-        }
-        (None, None) => {
-            let text = "it has no data of its own";
-            return Err(at(Reason::Unsupported(text.to_owned())));
-        }
-    }
+    };
     if let Some(sparse) = &accessor.sparse {
         let place = format!("{place}, sparse");
-        let replaced = sparse_indices(buffers, sparse, &place)?;
-        let elements = Elements {
+        let indices = sparse_indices(buffers, sparse, count, &place)?;
+        let run = Run {
             view: sparse.values.buffer_view,
-            byte_offset: sparse.values.byte_offset,
+            offset: sparse.values.byte_offset,
             count: sparse.count,
-            size,
+            component,
+            width: demand.width,
         };
-        let elements = elements.of(buffers, &format!("{place}.values"))?;
-        for (index, element) in replaced.into_iter().zip(elements) {
-            let first = (index as usize).saturating_mul(demand.width);
-            let range = first..first.saturating_add(demand.width);
-            let Some(values) = values.get_mut(range) else {
-                let text = format!("it replaces element {index} of {}", accessor.count);
-                return Err(Reason::Unsupported(text).at(Place::Part(format!("{place}.indices"))));
-            };
-            for (value, part) in values.iter_mut().zip(element.chunks(component.size())) {
-                *value = decode(component, part);
-            }
+        let replacing = run.decoded(buffers, &format!("{place}, values"), &decode)?;
+        for (index, element) in indices.iter().zip(replacing.chunks_exact(demand.width)) {
+            values[index * demand.width..][..demand.width].copy_from_slice(element);
         }
     }
     Ok(values)
 }
 
-/// The numbers of the elements that `sparse` replaces.
+/// The indices of the elements that `sparse` replaces, each below `count`. Messages name it `place`.
 fn sparse_indices(
     buffers: &mut Buffers<'_>,
     sparse: &Sparse,
+    count: usize,
     place: &str,
-) -> Result<Vec<u32>, Fault> {
-    let place = format!("{place}.indices");
+) -> Result<Vec<usize>, Fault> {
+    let place = format!("{place}, indices");
+    let at = |reason: Reason| reason.at(Place::Part(place.clone()));
     let component = Component::plain(sparse.indices.component_type);
     if !INDEX.components.contains(&component) {
         let (found, expected) = (component.name(), INDEX.expected);
-        return Err(Reason::Type { found, expected }.at(Place::Part(place)));
+        return Err(at(Reason::Type { found, expected }));
     }
-    let elements = Elements {
+    let run = Run {
         view: sparse.indices.buffer_view,
-        byte_offset: sparse.indices.byte_offset,
+        offset: sparse.indices.byte_offset,
         count: sparse.count,
-        size: component.size(),
+        component,
+        width: 1,
     };
-    let elements = elements.of(buffers, &place)?;
-    Ok(elements
-        .map(|bytes| decode_index(component, bytes))
-        .collect())
+    let indices = run.decoded(buffers, &place, &Component::index)?;
+    if let Some(pair) = indices.windows(2).find(|pair| pair[0] >= pair[1]) {
+        let text = format!("they must grow, and {} follows {}", pair[1], pair[0]);
+        return Err(at(Reason::Unsupported(text)));
+    }
+    match indices.last() {
+        Some(last) if *last as usize >= count => {
+            let text = format!("element {last} is not one of the accessor's {count}");
+            Err(at(Reason::Unsupported(text)))
+        }
+        _ => Ok(indices.into_iter().map(|index| index as usize).collect()),
+    }
 }
 
-/// Elements in a buffer view.
-struct Elements {
-    /// The buffer view.
+/// Elements that follow each other in a buffer view.
+struct Run {
     view: usize,
-    /// The first byte in it.
-    byte_offset: usize,
+    /// The first element's byte in the view.
+    offset: usize,
     /// The number of elements.
     count: usize,
-    /// The bytes of an element.
-    size: usize,
+    component: Component,
+    /// The components of an element.
+    width: usize,
 }
 
-impl Elements {
-    /// The bytes of each element, and of what lies between it and the next. Messages name them `place`.
-    fn of<'b>(
+impl Run {
+    /// The components, element after element, each decoded by `decode` from the bytes that it begins. Messages name the
+    /// run `place`.
+    fn decoded<T>(
         &self,
-        buffers: &'b mut Buffers<'_>,
+        buffers: &mut Buffers<'_>,
         place: &str,
-    ) -> Result<impl Iterator<Item = &'b [u8]> + use<'b>, Fault> {
+        decode: &impl Fn(Component, &[u8]) -> T,
+    ) -> Result<Vec<T>, Fault> {
+        let at = |reason: Reason| reason.at(Place::Part(place.to_owned()));
         let (bytes, stride) = buffers.view(self.view, place)?;
-        let stride = stride.unwrap_or(self.size);
+        let size = self.width * self.component.size();
+        let stride = stride.unwrap_or(size);
         let available = bytes.len() as u64;
-        let bytes = bytes.get(self.byte_offset..).unwrap_or_default();
+        let bytes = bytes.get(self.offset..).unwrap_or_default();
         let claimed = (self.count as u64)
             .saturating_sub(1)
             .saturating_mul(stride as u64)
-            .saturating_add(self.size as u64)
-            .saturating_add(self.byte_offset as u64);
-        if claimed > available || stride < self.size {
-            let reason = Reason::TooShort { claimed, available };
-            return Err(reason.at(Place::Part(place.to_owned())));
+            .saturating_add(size as u64)
+            .saturating_add(self.offset as u64);
+        if claimed > available || stride < size {
+            return Err(at(Reason::TooShort { claimed, available }));
         }
-        Ok(bytes.chunks(stride).take(self.count))
+        let mut values = reserved(self.count, self.width).map_err(at)?;
+        for element in bytes.chunks(stride).take(self.count) {
+            for c in 0..self.width {
+                values.push(decode(
+                    self.component,
+                    &element[c * self.component.size()..],
+                ));
+            }
+        }
+        Ok(values)
     }
+}
+
+/// An empty list with memory for `count` elements of `width` components.
+fn reserved<T>(count: usize, width: usize) -> Result<Vec<T>, Reason> {
+    let mut values = Vec::new();
+    let memory = |_| Reason::Memory((count as u64).saturating_mul(4 * width as u64));
+    values
+        .try_reserve_exact(count.saturating_mul(width))
+        .map_err(memory)?;
+    Ok(values)
 }

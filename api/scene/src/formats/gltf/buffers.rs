@@ -45,12 +45,10 @@ impl<'a> Buffers<'a> {
             .buffer_views
             .get(index)
             .ok_or_else(|| at(Reason::Missing, "bufferView"))?;
-        if let Some(extension) = view
-            .extensions
-            .keys()
-            .find(|name| name.contains("compression"))
-        {
-            let text = format!("its extension {extension:?} is not read");
+        // A file that doesn't require the extension has the data uncompressed, too, in a buffer for other readers.
+        let compressed = view.extensions.keys().find(|n| n.contains("compression"));
+        if let Some(extension) = compressed.filter(|_| !self.has_data(view.buffer)) {
+            let text = format!("its data is compressed by {extension:?}, which is not read");
             return Err(at(Reason::Unsupported(text), "bufferView"));
         }
         let buffer = self.buffer(view.buffer)?;
@@ -64,6 +62,19 @@ impl<'a> Buffers<'a> {
             at(Reason::TooShort { claimed, available }, "bufferView")
         })?;
         Ok((bytes, view.byte_stride))
+    }
+
+    /// False if buffer `index` is a placeholder without bytes.
+    fn has_data(&self, index: usize) -> bool {
+        let buffer = self.document.buffers.get(index);
+        buffer.is_none_or(|buffer| buffer.uri.is_some() || index == 0 && self.binary.is_some())
+    }
+
+    /// The bytes of all buffers that can be read.
+    pub(super) fn total_bytes(&mut self) -> u64 {
+        (0..self.document.buffers.len())
+            .map(|index| self.buffer(index).map_or(0, |bytes| bytes.len() as u64))
+            .sum()
     }
 
     /// The bytes of buffer `index`.

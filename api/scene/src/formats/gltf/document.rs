@@ -27,8 +27,11 @@ const FOLLOWED: [&str; 5] = [
     "KHR_animation_pointer",
 ];
 
-/// Prefixes of names of extensions that don't concern Gaussians.
-const IRRELEVANT: [&str; 2] = ["KHR_materials_", "KHR_texture_"];
+/// Prefixes of names of extensions that don't concern Gaussians, nor triangles without textures.
+const IRRELEVANT: [&str; 3] = ["KHR_materials_", "KHR_texture_", "EXT_texture_"];
+
+/// The extension that stores a primitive's triangles compressed.
+const DRACO: &str = "KHR_draco_mesh_compression";
 
 /// A document.
 #[derive(Deserialize)]
@@ -39,7 +42,7 @@ pub(super) struct Document {
     #[serde(default)]
     extensions_required: Vec<String>,
     #[serde(default)]
-    scenes: Vec<SceneNodes>,
+    pub(super) scenes: Vec<SceneNodes>,
     #[serde(default)]
     pub(super) nodes: Vec<Node>,
     #[serde(default)]
@@ -62,7 +65,7 @@ struct Asset {
 }
 
 #[derive(Deserialize)]
-struct SceneNodes {
+pub(super) struct SceneNodes {
     #[serde(default)]
     nodes: Vec<usize>,
 }
@@ -126,16 +129,16 @@ pub(super) struct Accessor {
     pub(super) sparse: Option<Sparse>,
 }
 
-/// Elements of an accessor that are replaced.
+/// The elements of an accessor that replace others.
 #[derive(Deserialize)]
 pub(super) struct Sparse {
-    /// The number of elements that are replaced.
     pub(super) count: usize,
+    /// The indices of the elements that are replaced, which grow.
     pub(super) indices: SparseIndices,
+    /// The elements that replace them, of the accessor's type.
     pub(super) values: SparseValues,
 }
 
-/// The numbers of the elements, in ascending order.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct SparseIndices {
@@ -145,7 +148,6 @@ pub(super) struct SparseIndices {
     pub(super) component_type: u32,
 }
 
-/// The values that replace them, in the accessor's type.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct SparseValues {
@@ -195,6 +197,20 @@ impl Document {
             }
             None => Ok(()),
         }
+    }
+
+    /// Refuses a primitive whose triangles are nowhere but in a compressed buffer view. Messages name it `place`.
+    pub(super) fn check_primitive(&self, primitive: &Primitive, place: &str) -> Result<(), Fault> {
+        let has_no_data = |index: &usize| {
+            let accessor = self.accessors.get(*index);
+            accessor.is_some_and(|accessor| accessor.buffer_view.is_none())
+        };
+        let mut accessors = primitive.attributes.values().chain(&primitive.indices);
+        if primitive.extensions.contains_key(DRACO) && accessors.any(has_no_data) {
+            let text = format!("its data is compressed by {DRACO:?}, which is not read");
+            return Err(Reason::Unsupported(text).at(Place::Part(place.to_owned())));
+        }
+        Ok(())
     }
 
     /// The root nodes of the default scene; of the first one if none is default, and of all trees if there is none.

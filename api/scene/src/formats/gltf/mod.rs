@@ -142,6 +142,12 @@ fn load(json: &[u8], binary: Option<&[u8]>, origin: Origin<'_>) -> Result<Scene,
             .metadata_mut()
             .note("textures of meshes are ignored, and their materials' colours are taken");
     }
+    if document.scenes.len() > 1 {
+        let others = document.scenes.len() - 1;
+        scene.metadata_mut().note(format!(
+            "scenes other than the default one are ignored: {others}"
+        ));
+    }
     if !document.animations.is_empty() {
         scene.metadata_mut().note("animations are ignored");
     }
@@ -215,6 +221,7 @@ impl Reader<'_> {
             .ok_or_else(|| Reason::Missing.at(Place::Part(format!("mesh {index}"))))?;
         for (number, primitive) in mesh.primitives.iter().enumerate() {
             let place = format!("mesh {index}, primitive {number}");
+            document.check_primitive(primitive, &place)?;
             let mut scene =
                 if let Some(scene) = primitive::gaussians(&mut self.buffers, primitive, &place)? {
                     scene
