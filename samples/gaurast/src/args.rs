@@ -498,8 +498,8 @@ fn elevation(text: &str) -> Result<f64, &'static str> {
 fn field_of_view(text: &str) -> Result<f64, &'static str> {
     text.parse()
         .ok()
-        .filter(|degrees| *degrees > 0.0 && *degrees < 180.0)
-        .ok_or("it is more than 0 and less than 180 degrees")
+        .filter(|degrees| *degrees > 0.0 && *degrees <= 360.0)
+        .ok_or("it is more than 0 and less than 180 degrees, or at most 360 for a fisheye")
 }
 
 #[cfg(test)]

@@ -41,6 +41,8 @@ pub enum ViewError {
     },
     #[error("--view {0}: neither an index, a range such as 3..7 or 0..100:10, nor all")]
     Range(String),
+    #[error("--fov {0}: it is less than 180 degrees, unless the camera is a fisheye")]
+    FieldOfView(f64),
     #[error("--view needs --cameras FILE, or a folder with a cameras.json as the scene")]
     NoCameras,
     #[error("{}: {source}", path.display())]
@@ -60,7 +62,10 @@ pub enum ViewError {
 impl ViewError {
     /// Returns true if the command line is invalid whatever the files contain.
     pub fn is_misuse(&self) -> bool {
-        matches!(self, Self::NoCameras | Self::Range(_))
+        matches!(
+            self,
+            Self::NoCameras | Self::Range(_) | Self::FieldOfView(_)
+        )
     }
 }
 
@@ -97,6 +102,11 @@ pub enum Known {
 /// # Errors
 /// See [`ViewError`].
 pub fn read(arguments: &CameraArguments, source: &Source) -> Result<Known, ViewError> {
+    if let Some(fov) = arguments.fov.filter(|fov| *fov >= 180.0)
+        && !is_inside(arguments.model)
+    {
+        return Err(ViewError::FieldOfView(fov));
+    }
     let size = arguments.size.map(|size| size.0);
     if let Some(path) = &arguments.path {
         return Ok(Known::Path(path_cameras(

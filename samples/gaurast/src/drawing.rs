@@ -21,6 +21,8 @@ pub enum DrawError {
     Render(#[from] RenderError),
     #[error(transparent)]
     Write(#[from] WriteError),
+    #[error("the thread that writes pictures cannot start: {0}")]
+    Thread(std::io::Error),
     #[error("{0}")]
     Limit(String),
     #[error("{0}")]
@@ -177,12 +179,15 @@ impl Drawing {
         std::thread::scope(|scope| {
             // The channel has no buffer: one picture is written while the next one is drawn.
             let (send, receive) = sync_channel::<Finished<'_>>(0);
-            let writing = scope.spawn(move || {
+            let write = move || {
                 for finished in receive {
                     writer.write(&finished)?;
                 }
                 writer.finish()
-            });
+            };
+            let writing = std::thread::Builder::new()
+                .spawn_scoped(scope, write)
+                .map_err(DrawError::Thread)?;
             let mut failed = None;
             for &index in indices {
                 let frame = match self.frame(&views[index]) {

@@ -301,6 +301,10 @@ fn misuse_is_exit_code_2_with_the_reason() {
         (&["render", "--size", "0x9"][..], "1 to 16384 pixels"),
         (&["render", "--size", "wide"], "such as 1280x720"),
         (&["render", "--fov", "180"], "less than 180"),
+        (
+            &["render", "--camera", "fisheye", "--fov", "361"],
+            "at most 360",
+        ),
         (&["render", "--eye", "1,2"], "three numbers"),
         (&["render", "--eye", "1,2,3"], "--target"),
         (&["render", "--view", "1"], "--cameras"),
