@@ -67,7 +67,7 @@ pub(super) fn memory_bytes(append: &GaussianAppend, with_harmonics: bool) -> u64
 /// The most Gaussians of a draw whose clusters are built in one piece. More would delay a picture noticeably.
 const AT_ONCE: usize = 64 * 1024;
 
-/// The number of Gaussians in a piece. That of a larger draw is so small that a picture takes about a fifth longer, but
+/// The number of Gaussians in a piece. That of a larger draw is so small that a picture takes about a tenth longer, but
 /// there are at most sixteen pieces, since pictures take longer until all exist.
 fn piece_size(count: usize) -> usize {
     if count <= AT_ONCE {
