@@ -29,7 +29,7 @@ while [ $# -gt 0 ]; do
     shift
 done
 if [ ! -x "${GAURAST_DEQP:-}" ]; then
-    echo "GAURAST_DEQP must name deqp-vk, built from VK-GL-CTS (docs/conformance.md says how)" >&2
+    echo "GAURAST_DEQP must name deqp-vk, built from VK-GL-CTS (docs/clients.md says how)" >&2
     exit 2
 fi
 GAURAST_DEQP=$(realpath "$GAURAST_DEQP")
