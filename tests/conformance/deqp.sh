@@ -48,7 +48,7 @@ if [ -z "$cases" ]; then
     sed -n 's/^TEST: //p' "$cases.listed" >"$cases"
 fi
 
-# Draws the cases: those of each module in the order of a hash of name and seed.
+# Draws the cases: those of each module in a random order.
 awk -v modules="${modules[*]}" -v drawn="$drawn" -v seed="$seed" '
     BEGIN { count = split(modules, wanted, " "); srand(seed) }
     {
