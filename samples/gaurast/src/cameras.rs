@@ -9,7 +9,6 @@ use gaurast_scene::{DEFAULT_UP, Extent, Framing, Scene, default_angles};
 use thiserror::Error;
 
 use crate::args::{CameraArguments, CameraModel};
-use crate::drawing::short;
 use crate::sources::{Source, stem};
 
 /// The default size of pictures.
@@ -341,6 +340,11 @@ fn by_hand(arguments: &CameraArguments, extent: &Extent, garden: bool) -> Result
     };
     views.framing = said;
     Ok(views)
+}
+
+/// A number with five significant digits.
+pub fn short(number: f64) -> f64 {
+    format!("{number:.4e}").parse().unwrap_or(number)
 }
 
 /// Three numbers in the form of an option's value.

@@ -8,7 +8,7 @@ use gaurast_scene::{MAX_SH_DEGREE, Scene, SortOrder};
 use thiserror::Error;
 
 use crate::args::{Antialiasing, Geometry, ModeArguments, Order};
-use crate::cameras::View;
+use crate::cameras::{View, short};
 use crate::limits;
 use crate::outputs::{Finished, Outputs, WriteError};
 use crate::progress::Progress;
@@ -237,11 +237,6 @@ impl Drawing {
         })?;
         Ok(drawn)
     }
-}
-
-/// A number with five significant digits.
-pub fn short(number: f64) -> f64 {
-    format!("{number:.4e}").parse().unwrap_or(number)
 }
 
 /// The reason for which the picture is empty, if it is, with counts of the skipped Gaussians.
