@@ -468,6 +468,7 @@ mod tests {
             count::<vk::PhysicalDeviceCustomBorderColorFeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceDepthClipEnableFeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceDepthClipControlFeaturesEXT<'_>>(),
+            count::<vk::PhysicalDeviceDepthClampZeroOneFeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceConditionalRenderingFeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceImage2DViewOf3DFeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceNonSeamlessCubeMapFeaturesEXT<'_>>(),
@@ -486,8 +487,8 @@ mod tests {
         assert_eq!(
             counts,
             [
-                39, 7, 43, 14, 1, 1, 1, 2, 1, 1, 2, 2, 2, 2, 1, 1, 2, 2, 1, 3, 6, 3, 4, 1, 14, 1,
-                1, 1, 1, 26
+                39, 7, 43, 14, 1, 1, 1, 2, 1, 1, 2, 2, 2, 2, 1, 1, 1, 2, 2, 1, 3, 6, 3, 4, 1, 14,
+                1, 1, 1, 1, 26
             ]
         );
         assert_eq!(count_of(&SUPPORTED), counts.iter().sum::<usize>());
