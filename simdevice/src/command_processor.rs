@@ -99,7 +99,8 @@ impl CommandProcessor {
         self.pass.is_some()
     }
 
-    /// Drops a render pass, a set of Gaussians and queries that were begun and not ended. Draws that were not flushed are lost.
+    /// Drops a render pass, a set of Gaussians and queries that were begun and not ended. Draws that were not flushed
+    /// are lost.
     pub fn reset(&mut self) {
         self.pass = None;
         self.gaussians.clear();

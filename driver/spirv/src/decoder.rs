@@ -174,8 +174,8 @@ impl Decoder<'_> {
         }
     }
 
-    /// Decodes a string of UTF-8, up to the word with its zero byte. What is not UTF-8 becomes U+FFFD, since names have
-    /// no meaning.
+    /// Decodes a string, up to the word with its zero byte. What is not UTF-8 becomes U+FFFD, since names for debugging
+    /// may be any bytes.
     fn string(&mut self) -> Result<(), Error> {
         let mut bytes = Vec::new();
         loop {

@@ -1,27 +1,18 @@
 """wgpu-py: a compute shader's numbers are those of numpy, and a triangle covers the pixels that it must."""
 
+from pathlib import Path
+
 import numpy as np
 import wgpu
 from wgpu.backends.wgpu_native.extras import set_instance_extras
 
+programs = Path(__file__).parent
 set_instance_extras(backends=["Vulkan"], flags=["AllowUnderlyingNoncompliantAdapter"])
 adapter = wgpu.gpu.request_adapter_sync()
 device = adapter.request_device_sync()
 
 COUNT = 100_000
-COLLATZ = """
-@group(0) @binding(0) var<storage, read_write> data: array<u32>;
-@compute @workgroup_size(64) fn main(@builtin(global_invocation_id) id: vec3u) {
-    if id.x >= arrayLength(&data) { return; }
-    var n = data[id.x];
-    var steps = 0u;
-    while n > 1u {
-        if n % 2u == 0u { n = n / 2u; } else { n = 3u * n + 1u; }
-        steps++;
-    }
-    data[id.x] = steps;
-}
-"""
+COLLATZ = (programs / "collatz.wgsl").read_text()
 buffer = device.create_buffer_with_data(
     data=np.arange(1, COUNT + 1, dtype=np.uint32),
     usage=wgpu.BufferUsage.STORAGE | wgpu.BufferUsage.COPY_SRC,
@@ -50,14 +41,7 @@ while (value > 1).any():
 assert (steps == want).all(), f"{(steps != want).sum()} of {COUNT} numbers differ"
 
 SIZE = 256
-TRIANGLE = """
-@vertex fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
-    return vec4f(f32(i & 1u) * 4.0 - 1.0, f32(i >> 1u) * 4.0 - 1.0, 0.5, 1.0) * vec4f(0.25, 0.25, 1.0, 1.0);
-}
-@fragment fn fs(@builtin(position) p: vec4f) -> @location(0) vec4f {
-    return vec4f(floor(p.xy) / 255.0, 0.2, 1.0);
-}
-"""
+TRIANGLE = (programs / "triangle.wgsl").read_text()
 texture = device.create_texture(
     size=(SIZE, SIZE),
     format="rgba8unorm",

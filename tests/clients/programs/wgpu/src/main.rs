@@ -4,27 +4,10 @@ use std::error::Error;
 use wgpu::util::DeviceExt;
 
 const COUNT: u32 = 100_000;
-const COLLATZ: &str = "
-@group(0) @binding(0) var<storage, read_write> data: array<u32>;
-@compute @workgroup_size(64) fn main(@builtin(global_invocation_id) id: vec3u) {
-    if id.x >= arrayLength(&data) { return; }
-    var n = data[id.x];
-    var steps = 0u;
-    while n > 1u {
-        if n % 2u == 0u { n = n / 2u; } else { n = 3u * n + 1u; }
-        steps++;
-    }
-    data[id.x] = steps;
-}";
+const COLLATZ: &str = include_str!("../../collatz.wgsl");
 
 const SIZE: u32 = 256;
-const TRIANGLE: &str = "
-@vertex fn vs(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
-    return vec4f(f32(i & 1u) * 4.0 - 1.0, f32(i >> 1u) * 4.0 - 1.0, 0.5, 1.0) * vec4f(0.25, 0.25, 1.0, 1.0);
-}
-@fragment fn fs(@builtin(position) p: vec4f) -> @location(0) vec4f {
-    return vec4f(floor(p.xy) / 255.0, 0.2, 1.0);
-}";
+const TRIANGLE: &str = include_str!("../../triangle.wgsl");
 
 /// The steps of the Collatz sequence from `n` to 1.
 fn steps(n: u32) -> u32 {
