@@ -24,10 +24,10 @@ fn lacking(what: &dyn std::fmt::Debug, feature: &str) -> Error {
     Error::FeatureNotPresent(format!("{what:?} (feature {feature})"))
 }
 
-/// The device's topology.
+/// The device's topology. The number of a patch's vertices is other state.
 ///
 /// # Errors
-/// [`Error::FeatureNotPresent`] for topologies that only geometry and tessellation stages take.
+/// [`Error::InvalidUsage`] for an unknown value.
 pub(crate) fn topology(topology: vk::PrimitiveTopology) -> Result<Topology, Error> {
     use vk::PrimitiveTopology as T;
     match topology {
@@ -37,11 +37,11 @@ pub(crate) fn topology(topology: vk::PrimitiveTopology) -> Result<Topology, Erro
         T::TRIANGLE_LIST => Ok(Topology::TriangleList),
         T::TRIANGLE_STRIP => Ok(Topology::TriangleStrip),
         T::TRIANGLE_FAN => Ok(Topology::TriangleFan),
-        T::LINE_LIST_WITH_ADJACENCY
-        | T::LINE_STRIP_WITH_ADJACENCY
-        | T::TRIANGLE_LIST_WITH_ADJACENCY
-        | T::TRIANGLE_STRIP_WITH_ADJACENCY => Err(lacking(&topology, "geometryShader")),
-        T::PATCH_LIST => Err(lacking(&topology, "tessellationShader")),
+        T::LINE_LIST_WITH_ADJACENCY => Ok(Topology::LineListWithAdjacency),
+        T::LINE_STRIP_WITH_ADJACENCY => Ok(Topology::LineStripWithAdjacency),
+        T::TRIANGLE_LIST_WITH_ADJACENCY => Ok(Topology::TriangleListWithAdjacency),
+        T::TRIANGLE_STRIP_WITH_ADJACENCY => Ok(Topology::TriangleStripWithAdjacency),
+        T::PATCH_LIST => Ok(Topology::PatchList { control_points: 0 }),
         other => Err(unknown(
             "VUID-VkPipelineInputAssemblyStateCreateInfo-topology-parameter",
             &other,

@@ -59,8 +59,14 @@ impl QueryType {
                 Statistic::VERTEX_SHADER_INVOCATIONS,
                 Some(Counter::VertexInvocations),
             ),
-            (Statistic::GEOMETRY_SHADER_INVOCATIONS, None),
-            (Statistic::GEOMETRY_SHADER_PRIMITIVES, None),
+            (
+                Statistic::GEOMETRY_SHADER_INVOCATIONS,
+                Some(Counter::GeometryInvocations),
+            ),
+            (
+                Statistic::GEOMETRY_SHADER_PRIMITIVES,
+                Some(Counter::GeometryPrimitives),
+            ),
             (
                 Statistic::CLIPPING_INVOCATIONS,
                 Some(Counter::ClippingInvocations),
@@ -73,8 +79,14 @@ impl QueryType {
                 Statistic::FRAGMENT_SHADER_INVOCATIONS,
                 Some(Counter::FragmentInvocations),
             ),
-            (Statistic::TESSELLATION_CONTROL_SHADER_PATCHES, None),
-            (Statistic::TESSELLATION_EVALUATION_SHADER_INVOCATIONS, None),
+            (
+                Statistic::TESSELLATION_CONTROL_SHADER_PATCHES,
+                Some(Counter::TessellationPatches),
+            ),
+            (
+                Statistic::TESSELLATION_EVALUATION_SHADER_INVOCATIONS,
+                Some(Counter::TessellationInvocations),
+            ),
             (
                 Statistic::COMPUTE_SHADER_INVOCATIONS,
                 Some(Counter::ComputeInvocations),

@@ -29,6 +29,7 @@ pub mod runtime;
 mod simd;
 pub mod state;
 pub mod stats;
+pub mod tessellation;
 pub mod texture;
 pub mod transfer;
 

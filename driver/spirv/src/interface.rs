@@ -9,6 +9,12 @@ use isa::ir::{ImageShape, Program};
 pub enum Stage {
     /// Runs once for each vertex (or Gaussian).
     Vertex,
+    /// Runs once for each output vertex of a patch.
+    TessellationControl,
+    /// Runs once for each vertex into which a patch is divided.
+    TessellationEvaluation,
+    /// Runs for each primitive.
+    Geometry,
     /// Runs once for each fragment, in quads.
     Fragment,
     /// Runs in workgroups.
@@ -19,6 +25,9 @@ impl std::fmt::Display for Stage {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
             Self::Vertex => "vertex",
+            Self::TessellationControl => "tessellation control",
+            Self::TessellationEvaluation => "tessellation evaluation",
+            Self::Geometry => "geometry",
             Self::Fragment => "fragment",
             Self::Compute => "compute",
         })
@@ -65,6 +74,11 @@ pub enum BuiltIn {
     Layer,
     ViewportIndex,
     PrimitiveId,
+    InvocationId,
+    PatchVertices,
+    TessCoord,
+    TessLevelOuter,
+    TessLevelInner,
     FragCoord,
     PointCoord,
     FrontFacing,
@@ -119,6 +133,8 @@ pub enum InputSource {
         /// Component or element.
         component: u32,
     },
+    /// The number in the batch of the patch to which a lane belongs; tessellation evaluation stage only.
+    Patch,
 }
 
 /// One scalar that the program reads. Its slot in the program is its index in [`Interface::inputs`].
@@ -149,6 +165,8 @@ pub enum OutputTarget {
         /// Component or element.
         component: u32,
     },
+    /// The number of vertices that a lane emitted; geometry stage only.
+    VertexCount,
 }
 
 /// One scalar that the program writes. Its slot in the program is its index in [`Interface::outputs`].
@@ -228,6 +246,104 @@ pub enum DepthMode {
     Unchanged,
 }
 
+/// The values of vertices in a batch's workgroup memory, where tessellation and geometry stages take and give them. Each
+/// primitive or patch of the batch has the same number of bytes.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct VertexMemory {
+    /// The first byte.
+    pub start: u32,
+    /// The bytes of each primitive or patch.
+    pub stride: u32,
+    /// The scalars that are read or written.
+    pub scalars: Vec<MemoryScalar>,
+}
+
+/// A scalar in the memory of a primitive or patch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MemoryScalar {
+    /// The output that it is, of this stage or of the one before.
+    pub target: OutputTarget,
+    /// Its type.
+    pub numeric: ScalarType,
+    /// Its first byte, of the first vertex.
+    pub offset: u32,
+    /// The bytes from one vertex to the next; `None` for a value of the patch.
+    pub vertex_stride: Option<u32>,
+}
+
+/// The exchange of vertices of a tessellation or geometry stage.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct VertexExchange {
+    /// The number of primitives or patches of a batch. A geometry stage has a lane for each; a tessellation control
+    /// stage has a lane for each output vertex of each patch, in order.
+    pub groups: u32,
+    /// The lanes of a batch, a multiple of 16.
+    pub lanes: u32,
+    /// The inputs. They are preloaded.
+    pub inputs: VertexMemory,
+    /// The outputs. A vertex that a geometry stage emits begins with a word that is 1 if it is the first of a strip.
+    pub outputs: VertexMemory,
+}
+
+/// The domain of tessellated patches.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs, reason = "the names are SPIR-V's")]
+pub enum Domain {
+    Triangles,
+    Quads,
+    Isolines,
+}
+
+/// The spacing of the vertices of a tessellated edge.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs, reason = "the names are SPIR-V's")]
+pub enum Spacing {
+    Equal,
+    FractionalEven,
+    FractionalOdd,
+}
+
+/// The primitives that a geometry stage takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs, reason = "the names are SPIR-V's")]
+pub enum InputPrimitive {
+    Points,
+    Lines,
+    LinesAdjacency,
+    Triangles,
+    TrianglesAdjacency,
+}
+
+/// The primitives that a geometry stage emits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs, reason = "the names are SPIR-V's")]
+pub enum OutputPrimitive {
+    Points,
+    LineStrip,
+    TriangleStrip,
+}
+
+/// The execution modes of tessellation and geometry stages. Both tessellation stages may have those of tessellation.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PrimitiveModes {
+    /// Tessellation: the domain.
+    pub domain: Option<Domain>,
+    /// Tessellation: the spacing.
+    pub spacing: Option<Spacing>,
+    /// Tessellation: true if triangles are clockwise.
+    pub clockwise: Option<bool>,
+    /// Tessellation: true if the vertices become points.
+    pub point_mode: bool,
+    /// Tessellation control: the number of vertices of an output patch. Geometry: the most vertices that are emitted.
+    pub output_vertices: Option<u32>,
+    /// Geometry: the number of invocations for each primitive.
+    pub invocations: Option<u32>,
+    /// Geometry: the primitives that it takes.
+    pub input: Option<InputPrimitive>,
+    /// Geometry: the primitives that it emits.
+    pub output: Option<OutputPrimitive>,
+}
+
 /// A translated shader's interface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Interface {
@@ -251,6 +367,10 @@ pub struct Interface {
     pub discards: bool,
     /// Fragment: true if it must run for each sample.
     pub per_sample: bool,
+    /// Tessellation and geometry: the execution modes.
+    pub modes: PrimitiveModes,
+    /// Tessellation and geometry: the exchange of vertices.
+    pub exchange: VertexExchange,
     /// True if it stores to buffers or images, or uses atomics, so that it can't be skipped.
     pub has_side_effects: bool,
     /// True if it accesses memory by device addresses.
@@ -269,7 +389,7 @@ impl Interface {
                     component,
                     ..
                 } => Some((location, component, input.numeric)),
-                InputSource::BuiltIn { .. } => None,
+                InputSource::BuiltIn { .. } | InputSource::Patch => None,
             })
             .collect();
         found.sort_by_key(|(location, component, _)| (*location, *component));

@@ -20,8 +20,9 @@ mod types;
 pub use error::{Error, InstructionRef};
 pub use globals::Specialization;
 pub use interface::{
-    BuiltIn, DepthMode, DescriptorKind, ImageUse, Input, InputSource, Interface, Interpolation,
-    Output, OutputTarget, Sampling, ScalarType, Shader, ShaderBinding, Stage,
+    BuiltIn, DepthMode, DescriptorKind, Domain, ImageUse, Input, InputPrimitive, InputSource,
+    Interface, Interpolation, MemoryScalar, Output, OutputPrimitive, OutputTarget, PrimitiveModes,
+    Sampling, ScalarType, Shader, ShaderBinding, Spacing, Stage, VertexExchange, VertexMemory,
 };
 pub use module::Module;
 pub use translate::{Options, is_supported, translate};

@@ -4665,15 +4665,24 @@ unsafe extern "system" fn vkSubmitDebugUtilsMessageEXT(
     })
 }
 
-unsafe extern "system" fn vkCmdSetPatchControlPointsEXT(command_buffer: vk::CommandBuffer, _: u32) {
+unsafe extern "system" fn vkCmdSetPatchControlPointsEXT(
+    command_buffer: vk::CommandBuffer,
+    patch_control_points: u32,
+) {
     guard(command_buffer, "vkCmdSetPatchControlPointsEXT", || {
-        // SAFETY: the application follows Vulkan's valid usage: the handle is live.
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, "vkCmdSetPatchControlPointsEXT", |_| {
-                Err(Error::Unsupported {
-                    command: "vkCmdSetPatchControlPointsEXT".to_owned(),
-                })
-            })
+            record(
+                command_buffer,
+                "vkCmdSetPatchControlPointsEXT",
+                |recorder| {
+                    let count = patch_control_points;
+                    crate::command::dynamic_state::set(
+                        recorder,
+                        DynamicState::PatchControlPoints { count },
+                    )
+                },
+            )
         }
     })
 }
@@ -4879,21 +4888,23 @@ unsafe extern "system" fn vkCmdSetColorWriteMaskEXT(
 
 unsafe extern "system" fn vkCmdSetTessellationDomainOriginEXT(
     command_buffer: vk::CommandBuffer,
-    _: vk::TessellationDomainOrigin,
+    domain_origin: vk::TessellationDomainOrigin,
 ) {
     guard(
         command_buffer,
         "vkCmdSetTessellationDomainOriginEXT",
         || {
-            // SAFETY: the application follows Vulkan's valid usage: the handle is live.
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
             unsafe {
                 record(
                     command_buffer,
                     "vkCmdSetTessellationDomainOriginEXT",
-                    |_| {
-                        Err(Error::Unsupported {
-                            command: "vkCmdSetTessellationDomainOriginEXT".to_owned(),
-                        })
+                    |recorder| {
+                        let origin = domain_origin;
+                        crate::command::dynamic_state::set(
+                            recorder,
+                            DynamicState::TessellationDomainOrigin { origin },
+                        )
                     },
                 )
             }

@@ -90,8 +90,26 @@ pub(crate) const MIN_BUFFER_OFFSET_ALIGNMENT: u64 = 16;
 /// The most texels of a texel buffer.
 pub(crate) const MAX_TEXEL_BUFFER_ELEMENTS: u32 = 1 << 27;
 
-/// The most scalars that a vertex shader passes to a fragment shader: 32 vectors of four.
+/// The most scalars of a vertex that a stage passes to the next: 32 vectors of four.
 const MAX_VARYING_COMPONENTS: u32 = 128;
+
+/// The greatest level to which an edge of a patch is divided.
+const MAX_TESSELLATION_LEVEL: u32 = simdevice::tessellation::MAX_LEVEL;
+
+/// The most vertices of a patch.
+pub(crate) const MAX_PATCH_SIZE: u32 = 32;
+
+/// The most scalars of a whole patch.
+const MAX_PATCH_COMPONENTS: u32 = 128;
+
+/// The most invocations of a geometry shader for a primitive.
+const MAX_GEOMETRY_INVOCATIONS: u32 = 32;
+
+/// The most vertices that an invocation of a geometry shader emits.
+const MAX_GEOMETRY_VERTICES: u32 = 256;
+
+/// The most scalars of all vertices that an invocation of a geometry shader emits.
+const MAX_GEOMETRY_COMPONENTS: u32 = 1024;
 
 /// The offsets in texels that an instruction may have.
 const TEXEL_OFFSETS: std::ops::RangeInclusive<i32> = -32..=31;
@@ -185,19 +203,20 @@ fn find_properties() -> Properties {
         max_vertex_input_attribute_offset: 65535,
         max_vertex_input_binding_stride: 65536,
         max_vertex_output_components: MAX_VARYING_COMPONENTS,
-        max_tessellation_generation_level: 0,
-        max_tessellation_patch_size: 0,
-        max_tessellation_control_per_vertex_input_components: 0,
-        max_tessellation_control_per_vertex_output_components: 0,
-        max_tessellation_control_per_patch_output_components: 0,
-        max_tessellation_control_total_output_components: 0,
-        max_tessellation_evaluation_input_components: 0,
-        max_tessellation_evaluation_output_components: 0,
-        max_geometry_shader_invocations: 0,
-        max_geometry_input_components: 0,
-        max_geometry_output_components: 0,
-        max_geometry_output_vertices: 0,
-        max_geometry_total_output_components: 0,
+        max_tessellation_generation_level: MAX_TESSELLATION_LEVEL,
+        max_tessellation_patch_size: MAX_PATCH_SIZE,
+        max_tessellation_control_per_vertex_input_components: MAX_VARYING_COMPONENTS,
+        max_tessellation_control_per_vertex_output_components: MAX_VARYING_COMPONENTS,
+        max_tessellation_control_per_patch_output_components: MAX_PATCH_COMPONENTS,
+        max_tessellation_control_total_output_components: MAX_PATCH_SIZE * MAX_VARYING_COMPONENTS
+            + MAX_PATCH_COMPONENTS,
+        max_tessellation_evaluation_input_components: MAX_VARYING_COMPONENTS,
+        max_tessellation_evaluation_output_components: MAX_VARYING_COMPONENTS,
+        max_geometry_shader_invocations: MAX_GEOMETRY_INVOCATIONS,
+        max_geometry_input_components: MAX_VARYING_COMPONENTS,
+        max_geometry_output_components: MAX_VARYING_COMPONENTS,
+        max_geometry_output_vertices: MAX_GEOMETRY_VERTICES,
+        max_geometry_total_output_components: MAX_GEOMETRY_COMPONENTS,
         max_fragment_input_components: MAX_VARYING_COMPONENTS,
         max_fragment_output_attachments: MAX_COLOR_ATTACHMENTS,
         max_fragment_dual_src_attachments: 1,
@@ -274,6 +293,9 @@ fn find_properties() -> Properties {
         subgroup_size: SUBGROUP_SIZE,
         subgroup_supported_stages: vk::ShaderStageFlags::from_raw(
             vk::ShaderStageFlags::VERTEX.as_raw()
+                | vk::ShaderStageFlags::TESSELLATION_CONTROL.as_raw()
+                | vk::ShaderStageFlags::TESSELLATION_EVALUATION.as_raw()
+                | vk::ShaderStageFlags::GEOMETRY.as_raw()
                 | vk::ShaderStageFlags::FRAGMENT.as_raw()
                 | vk::ShaderStageFlags::COMPUTE.as_raw(),
         ),

@@ -154,6 +154,11 @@ dynamic_states! {
         set |state| state.set_front_face(face), needed Fixed::rasterizes, gaussians Ignored;
     PRIMITIVE_TOPOLOGY => PrimitiveTopology(topology: Topology),
         set |state| state.draw.topology = topology, needed |_| true, gaussians Ignored;
+    PATCH_CONTROL_POINTS_EXT => PatchControlPoints(count: u32),
+        set |state| state.set_patch_control_points(count), needed Fixed::draws_patches, gaussians Ignored;
+    TESSELLATION_DOMAIN_ORIGIN_EXT => TessellationDomainOrigin(origin: vk::TessellationDomainOrigin),
+        set |state| state.draw.lower_left_domain = origin == vk::TessellationDomainOrigin::LOWER_LEFT,
+        needed Fixed::draws_patches, gaussians Ignored;
     PRIMITIVE_RESTART_ENABLE => PrimitiveRestartEnable(enable: bool),
         set |state| state.draw.primitive_restart = enable, needed |_| true, gaussians Refused;
     RASTERIZER_DISCARD_ENABLE => RasterizerDiscardEnable(enable: bool),

@@ -86,7 +86,7 @@ impl PipelineLayout {
         }
         let vuid = match interface.stage {
             Stage::Compute => "VUID-VkComputePipelineCreateInfo-layout-07988",
-            Stage::Vertex | Stage::Fragment => "VUID-VkGraphicsPipelineCreateInfo-layout-07988",
+            _ => "VUID-VkGraphicsPipelineCreateInfo-layout-07988",
         };
         Err(Error::usage(vuid, mismatches.join("; ")))
     }
@@ -169,6 +169,9 @@ impl PipelineLayout {
 fn stage_flag(stage: Stage) -> vk::ShaderStageFlags {
     match stage {
         Stage::Vertex => vk::ShaderStageFlags::VERTEX,
+        Stage::TessellationControl => vk::ShaderStageFlags::TESSELLATION_CONTROL,
+        Stage::TessellationEvaluation => vk::ShaderStageFlags::TESSELLATION_EVALUATION,
+        Stage::Geometry => vk::ShaderStageFlags::GEOMETRY,
         Stage::Fragment => vk::ShaderStageFlags::FRAGMENT,
         Stage::Compute => vk::ShaderStageFlags::COMPUTE,
     }

@@ -1,10 +1,15 @@
-//! Linking: the exchange of values between a vertex program, a fragment program and the device.
+//! Linking: the exchange of values between the programs of a pipeline and the device. `link_primitives` links those
+//! between the vertex and the fragment program.
 //!
 //! Stages are matched by location and component. A varying is passed on only if the fragment program reads it: other
 //! outputs are removed from the vertex program, so that the device drops the computations for them. A varying that is
 //! read but never written is zero. Clip and cull distances that the fragment program reads are passed on as varyings,
 //! too.
 
+use super::link_primitives::{
+    self, Given, TessellationShaders, carry_written, components_written, given, gives_memory,
+    output_given,
+};
 use crate::abi::error::Error;
 use gaurast_spirv::{
     BuiltIn, DepthMode, Input, InputSource, Interface, Interpolation, Output, OutputTarget,
@@ -36,29 +41,91 @@ pub(crate) type InterfaceComponent = (u32, u32);
 /// The numbers of varyings, by location and component.
 pub(crate) type Varyings = HashMap<InterfaceComponent, u32>;
 
+/// The shaders of a pipeline's stages.
+pub(crate) struct StageShaders {
+    /// The vertex shader.
+    pub(crate) vertex: Shader,
+    /// The tessellation shaders.
+    pub(crate) tessellation: Option<TessellationShaders>,
+    /// The geometry shader.
+    pub(crate) geometry: Option<Shader>,
+    /// The fragment shader.
+    pub(crate) fragment: Option<Shader>,
+}
+
+impl StageShaders {
+    /// All shaders, in the order of their stages.
+    fn all(&self) -> impl Iterator<Item = &Shader> {
+        let tessellation = self.tessellation.iter();
+        let tessellation = tessellation.flat_map(|it| [&it.control, &it.evaluation]);
+        let after = self.geometry.iter().chain(&self.fragment);
+        std::iter::once(&self.vertex)
+            .chain(tessellation)
+            .chain(after)
+    }
+
+    /// The last shader before rasterization.
+    pub(crate) fn last(&self) -> &Shader {
+        let evaluation = self.tessellation.as_ref().map(|it| &it.evaluation);
+        let last = self.geometry.as_ref().or(evaluation);
+        last.unwrap_or(&self.vertex)
+    }
+}
+
 /// Links programs. `stream` gives the attribute stream of a vertex input's location.
 ///
 /// # Errors
 /// [`Error::FeatureNotPresent`] if the device can't pass the values between the stages.
 pub(crate) fn link(
-    mut vertex: Shader,
-    mut fragment: Option<Shader>,
+    mut shaders: StageShaders,
     stream: impl Fn(u32) -> Option<usize>,
     live_outputs: LiveOutputs<'_>,
 ) -> Result<DrawPrograms, Error> {
-    check_widths(&vertex.interface)?;
-    let varyings = match &mut fragment {
+    for shader in shaders.all() {
+        check_widths(&shader.interface)?;
+    }
+    let varyings = match shaders.fragment.take() {
         None => Varyings::new(),
-        Some(fragment) => {
-            check_widths(&fragment.interface)?;
-            carry_distances(&mut vertex, fragment);
-            varyings(&vertex.interface, &fragment.interface)
+        Some(mut fragment) => {
+            let evaluation = shaders.tessellation.as_mut().map(|it| &mut it.evaluation);
+            let last = shaders.geometry.as_mut().or(evaluation);
+            let last = last.unwrap_or(&mut shaders.vertex);
+            carry_distances(last, &mut fragment);
+            let varyings = varyings(&last.interface, &fragment.interface);
+            shaders.fragment = Some(fragment);
+            varyings
         }
     };
+    let StageShaders {
+        vertex,
+        tessellation,
+        geometry,
+        fragment,
+    } = shaders;
+    // The values that each stage gives to a stage of primitives after it.
+    let control = tessellation.as_ref().map(|it| &it.control);
+    let next = control.or(geometry.as_ref());
+    let of_vertices = next.map(|next| given(&vertex.interface, &next.interface));
+    let before = tessellation.as_ref().zip(geometry.as_ref());
+    let of_evaluation = before.map(|(it, next)| given(&it.evaluation.interface, &next.interface));
+    let output = |target, given: &Option<Given>| match given {
+        Some(given) => output_given(target, given),
+        None => vertex_output(target, &varyings, live_outputs),
+    };
+    let programs = vertex_programs(vertex, stream, |target| output(target, &of_vertices));
+    let none = Given::new();
+    let of_last = of_evaluation.as_ref().or(of_vertices.as_ref());
     Ok(DrawPrograms {
         varyings: varyings.len() as u32,
+        tessellation: tessellation.map(|shaders| {
+            let given = of_vertices.as_ref().unwrap_or(&none);
+            link_primitives::tessellation(shaders, given, |target| output(target, &of_evaluation))
+        }),
+        geometry: geometry.map(|shader| {
+            link_primitives::geometry(shader, of_last.unwrap_or(&none), &varyings, live_outputs)
+        }),
         fragment: fragment.map(|fragment| fragment_programs(fragment, &varyings, live_outputs)),
-        ..vertex_programs(vertex, &varyings, stream, live_outputs)
+        ..programs
     })
 }
 
@@ -75,8 +142,9 @@ pub(crate) fn link_projection(
     let varyings: Varyings = components.iter().copied().zip(0..).collect();
     Ok(DrawPrograms {
         varyings: components.len() as u32,
-        fragment: None,
-        ..vertex_programs(vertex, &varyings, stream, LiveOutputs::default())
+        ..vertex_programs(vertex, stream, |target| {
+            vertex_output(target, &varyings, LiveOutputs::default())
+        })
     })
 }
 
@@ -97,9 +165,8 @@ pub(crate) fn link_resolve(
 /// The vertex program alone.
 fn vertex_programs(
     vertex: Shader,
-    varyings: &Varyings,
     stream: impl Fn(u32) -> Option<usize>,
-    live_outputs: LiveOutputs<'_>,
+    meaning: impl Fn(OutputTarget) -> Option<VertexOutput>,
 ) -> DrawPrograms {
     let Shader {
         program: mut vertex,
@@ -114,7 +181,7 @@ fn vertex_programs(
     let vertex_outputs: Vec<_> = interface
         .outputs
         .iter()
-        .map(|output| vertex_output(output, varyings, live_outputs))
+        .map(|output| meaning(output.target))
         .collect();
     drop_outputs(&mut vertex, &vertex_outputs);
     DrawPrograms {
@@ -122,6 +189,8 @@ fn vertex_programs(
         vertex_inputs,
         vertex_outputs,
         varyings: 0,
+        tessellation: None,
+        geometry: None,
         fragment: None,
     }
 }
@@ -174,7 +243,14 @@ fn check_widths(interface: &Interface) -> Result<(), Error> {
     };
     let inputs = interface.inputs.iter().map(|input| input.numeric);
     let outputs = interface.outputs.iter().map(|output| output.numeric);
-    if inputs.chain(outputs).any(is_wide) {
+    let exchange = &interface.exchange;
+    let scalars = exchange
+        .inputs
+        .scalars
+        .iter()
+        .chain(&exchange.outputs.scalars);
+    let exchanged = scalars.map(|scalar| scalar.numeric);
+    if inputs.chain(outputs).chain(exchanged).any(is_wide) {
         return Err(Error::FeatureNotPresent(format!(
             "an input or output of 64 bits in the {} shader",
             interface.stage
@@ -192,8 +268,8 @@ fn location_of_distance(built_in: BuiltIn) -> Option<u32> {
     }
 }
 
-/// Makes varyings of the distances that the fragment program reads. The vertex program's outputs are unchanged, and are
-/// written to varyings as well.
+/// Makes varyings of the distances that the fragment program reads. The outputs of the stage before are unchanged, and
+/// are written to varyings as well.
 fn carry_distances(vertex: &mut Shader, fragment: &mut Shader) {
     for input in &mut fragment.interface.inputs {
         let InputSource::BuiltIn {
@@ -216,6 +292,10 @@ fn carry_distances(vertex: &mut Shader, fragment: &mut Shader) {
             built_in,
             component,
         };
+        if gives_memory(&vertex.interface) {
+            carry_written(&mut vertex.interface, written, location, component);
+            continue;
+        }
         let outputs = &mut vertex.interface.outputs;
         let Some(slot) = outputs.iter().position(|output| output.target == written) else {
             continue;
@@ -270,20 +350,17 @@ fn components_read(interface: &Interface) -> impl Iterator<Item = InterfaceCompo
             component,
             ..
         } => Some((location, component)),
-        InputSource::BuiltIn { .. } => None,
+        InputSource::BuiltIn { .. } | InputSource::Patch => None,
     })
 }
 
 /// Reports whether a stage writes a component of a location.
 fn writes(interface: &Interface, place: InterfaceComponent) -> bool {
-    interface.outputs.iter().any(|output| {
-        matches!(output.target, OutputTarget::Location { location, component, .. }
-            if (location, component) == place)
-    })
+    components_written(interface).any(|written| written == place)
 }
 
 /// Replaces by a constant zero the inputs without a source. (Slots are indices into `inputs`.)
-fn zero_inputs<T>(program: &mut Program, inputs: &[Option<T>]) {
+pub(super) fn zero_inputs<T>(program: &mut Program, inputs: &[Option<T>]) {
     let Program {
         inputs: registers,
         constants,
@@ -302,7 +379,7 @@ fn zero_inputs<T>(program: &mut Program, inputs: &[Option<T>]) {
 }
 
 /// Removes outputs that are never read.
-fn drop_outputs<T>(program: &mut Program, outputs: &[Option<T>]) {
+pub(super) fn drop_outputs<T>(program: &mut Program, outputs: &[Option<T>]) {
     program
         .outputs
         .retain(|output| outputs[output.slot as usize].is_some());
@@ -328,15 +405,18 @@ fn vertex_input(input: &Input, stream: impl Fn(u32) -> Option<usize>) -> Option<
             // A group has only one device, whose index is zero.
             _ => None,
         },
+        InputSource::Patch => None,
     }
 }
 
-fn vertex_output(
-    output: &Output,
+/// The meaning of an output of the last stage before rasterization.
+pub(super) fn vertex_output(
+    target: OutputTarget,
     varyings: &Varyings,
     live_outputs: LiveOutputs<'_>,
 ) -> Option<VertexOutput> {
-    match output.target {
+    match target {
+        OutputTarget::VertexCount => None,
         OutputTarget::Location {
             location,
             component,
@@ -356,6 +436,7 @@ fn vertex_output(
                 BuiltIn::CullDistance => Some(VertexOutput::CullDistance(component)),
                 BuiltIn::Layer => Some(VertexOutput::Layer),
                 BuiltIn::ViewportIndex => Some(VertexOutput::ViewportIndex),
+                BuiltIn::PrimitiveId => Some(VertexOutput::PrimitiveId),
                 _ => None,
             }
         }
@@ -404,6 +485,7 @@ fn fragment_input(input: &Input, varyings: &Varyings, views: bool) -> Option<Fra
                 _ => None,
             }
         }
+        InputSource::Patch => None,
     }
 }
 
@@ -430,13 +512,14 @@ fn fragment_output(output: &Output, live_outputs: LiveOutputs<'_>) -> Option<Fra
             BuiltIn::SampleMask if component == 0 => Some(FragmentOutput::SampleMask),
             _ => None,
         },
+        OutputTarget::VertexCount => None,
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gaurast_spirv::Stage;
+    use gaurast_spirv::{PrimitiveModes, Stage, VertexExchange};
     use simdevice::isa::builder::Builder;
     use simdevice::isa::ir::Rate;
     use simdevice::isa::ir::Type;
@@ -503,9 +586,20 @@ mod tests {
                 depth: DepthMode::NotWritten,
                 discards: false,
                 per_sample: false,
+                modes: PrimitiveModes::default(),
+                exchange: VertexExchange::default(),
                 has_side_effects: false,
                 uses_addresses: false,
             },
+        }
+    }
+
+    fn stages(vertex: Shader, fragment: Option<Shader>) -> StageShaders {
+        StageShaders {
+            vertex,
+            tessellation: None,
+            geometry: None,
+            fragment,
         }
     }
 
@@ -532,7 +626,7 @@ mod tests {
             ..LiveOutputs::default()
         };
         let stream = |location| (location == 7).then_some(3);
-        let linked = link(vertex, Some(fragment), stream, live_outputs).unwrap();
+        let linked = link(stages(vertex, Some(fragment)), stream, live_outputs).unwrap();
         assert_eq!(linked.varyings, 2);
         assert_eq!(
             linked.vertex_inputs,
@@ -605,7 +699,12 @@ mod tests {
             read(BuiltIn::CullDistance, 3),
         ];
         let fragment = shader(Stage::Fragment, inputs, vec![to(0, 0)]);
-        let linked = link(vertex, Some(fragment), |_| None, LiveOutputs::default()).unwrap();
+        let linked = link(
+            stages(vertex, Some(fragment)),
+            |_| None,
+            LiveOutputs::default(),
+        )
+        .unwrap();
         assert_eq!(linked.varyings, 2);
         let outputs = [
             VertexOutput::ClipDistance(0),
@@ -633,7 +732,7 @@ mod tests {
         let mut wide = to(0, 0);
         wide.numeric = ScalarType::Float { width: 64 };
         let vertex = shader(Stage::Vertex, vec![], vec![wide]);
-        let error = link(vertex, None, |_| None, LiveOutputs::default()).unwrap_err();
+        let error = link(stages(vertex, None), |_| None, LiveOutputs::default()).unwrap_err();
         assert_eq!(error.result(), ash::vk::Result::ERROR_FEATURE_NOT_PRESENT);
     }
 }

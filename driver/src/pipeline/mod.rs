@@ -7,6 +7,7 @@ pub(crate) mod dynamic_state;
 pub(crate) mod gaussian;
 pub(crate) mod layout;
 mod link;
+mod link_primitives;
 pub(crate) mod primitives;
 pub(crate) mod stages;
 pub(crate) mod state;

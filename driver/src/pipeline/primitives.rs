@@ -1,7 +1,9 @@
 //! Pipelines of points, lines and triangles: shader stages translated, checked and linked, and fixed-function state.
 
 use super::dynamic_state;
-use super::link::{self, LiveOutputs};
+use super::layout::PipelineLayout;
+use super::link::{self, LiveOutputs, StageShaders};
+use super::link_primitives::{self, TessellationShaders};
 use super::stages::{self, ProgramResources};
 use super::state::{
     self, AttributeSource, Class, FixedFunctionState, GraphicsState, live_color_outputs,
@@ -9,9 +11,10 @@ use super::state::{
 };
 use crate::abi::error::Error;
 use crate::device::Device;
+use crate::physical_device::limits;
 use crate::shader_module::ShaderStage;
 use ash::vk;
-use gaurast_spirv::{ScalarType, Stage};
+use gaurast_spirv::{ScalarType, Shader, Stage};
 use simdevice::program::vertex::DrawPipeline;
 use simdevice::state::{DrawState, PolygonMode};
 use std::sync::Arc;
@@ -27,6 +30,12 @@ pub(crate) struct PrimitivePipeline {
     pub(crate) dynamic_locations: Option<Vec<(u32, ScalarType)>>,
     /// The resources that the vertex program is bound to.
     pub(crate) vertex_resources: ProgramResources,
+    /// The resources that the tessellation control program is bound to.
+    pub(crate) control_resources: ProgramResources,
+    /// The resources that the tessellation evaluation program is bound to.
+    pub(crate) evaluation_resources: ProgramResources,
+    /// The resources that the geometry program is bound to.
+    pub(crate) geometry_resources: ProgramResources,
     /// The resources that the fragment program is bound to.
     pub(crate) fragment_resources: ProgramResources,
     /// The static fixed-function state.
@@ -69,39 +78,45 @@ impl PrimitivePipeline {
                 "the pipeline has no layout",
             )
         })?;
-        let stages = Stages::find(info)?;
-        let samples = fixed.draw.samples;
-        let vertex = stages::translate(device, layout, stages.vertex, Stage::Vertex, samples)?;
-        let fragment = stages
-            .fragment
-            .map(|stage| stages::translate(device, layout, stage, Stage::Fragment, samples))
-            .transpose()?;
-        let locations = vertex.interface.locations_read();
+        let stages = Stages::find(device, info)?;
+        let shaders = stages.translate(device, layout, fixed.draw.samples)?;
+        link_primitives::check(shaders.tessellation.as_ref(), shaders.geometry.as_ref())?;
+        let locations = shaders.vertex.interface.locations_read();
         let is_dynamic = info.is_dynamic(vk::DynamicState::VERTEX_INPUT_EXT);
         let attributes = if is_dynamic {
             Vec::new()
         } else {
             stages::attributes(&info.vertex_input, &locations)?
         };
-        if let Some(fragment) = &fragment {
-            stages::warn_of_unwritten(device, &vertex.interface, &fragment.interface);
+        if let Some(fragment) = &shaders.fragment {
+            let last = &shaders.last().interface;
+            stages::warn_of_unwritten(device, last, &fragment.interface);
         }
-        let vertex_resources = ProgramResources::new(device, &vertex.interface);
-        let fragment_resources = fragment.as_ref().map_or_else(Default::default, |fragment| {
-            ProgramResources::new(device, &fragment.interface)
-        });
+        let resources = |shader: Option<&Shader>| {
+            shader.map_or_else(Default::default, |shader| {
+                ProgramResources::new(device, &shader.interface)
+            })
+        };
+        let tessellation = shaders.tessellation.as_ref();
+        let vertex_resources = resources(Some(&shaders.vertex));
+        let control_resources = resources(tessellation.map(|it| &it.control));
+        let evaluation_resources = resources(tessellation.map(|it| &it.evaluation));
+        let geometry_resources = resources(shaders.geometry.as_ref());
+        let fragment_resources = resources(shaders.fragment.as_ref());
         let color = live_color_outputs(info, &fixed);
         let live_outputs = LiveOutputs {
             color: &color,
             second_source: info.fragment_output.blend.iter().any(reads_second_source)
                 || info.is_dynamic(vk::DynamicState::COLOR_BLEND_EQUATION_EXT),
             points: state::class(fixed.draw.topology) == Class::Points
+                || shaders.geometry.is_some()
+                || shaders.tessellation.is_some()
                 || info.is_dynamic(vk::DynamicState::POLYGON_MODE_EXT)
                 || fixed.draw.polygon_mode == PolygonMode::Point,
             views: info.fragment_output.view_mask != 0,
         };
         let stream = |location| locations.iter().position(|(read, _)| *read == location);
-        let programs = link::link(vertex, fragment, stream, live_outputs)?;
+        let programs = link::link(shaders, stream, live_outputs)?;
         let programs = DrawPipeline::new(device.simulated().level(), &programs)
             .map_err(|error| Error::InvalidShader(error.to_string()))?;
         let is_static = dynamic.is_empty()
@@ -112,6 +127,9 @@ impl PrimitivePipeline {
             attributes,
             dynamic_locations: is_dynamic.then_some(locations),
             vertex_resources,
+            control_resources,
+            evaluation_resources,
+            geometry_resources,
             fragment_resources,
             state: is_static.then(|| Arc::new(fixed.draw_state())),
             fixed,
@@ -125,13 +143,21 @@ impl PrimitivePipeline {
 /// The stages of a pipeline.
 struct Stages<'a> {
     vertex: &'a ShaderStage<'a>,
+    /// The tessellation control and evaluation stages.
+    tessellation: Option<[&'a ShaderStage<'a>; 2]>,
+    geometry: Option<&'a ShaderStage<'a>>,
     /// The fragment stage; None if nothing is rasterized.
     fragment: Option<&'a ShaderStage<'a>>,
 }
 
 impl<'a> Stages<'a> {
-    fn find(info: &'a GraphicsState) -> Result<Self, Error> {
-        let known = vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT;
+    fn find(device: &Device, info: &'a GraphicsState) -> Result<Self, Error> {
+        use vk::ShaderStageFlags as F;
+        let known = F::VERTEX
+            | F::TESSELLATION_CONTROL
+            | F::TESSELLATION_EVALUATION
+            | F::GEOMETRY
+            | F::FRAGMENT;
         if let Some((stage, _)) = info.stages().find(|(stage, _)| !known.contains(*stage)) {
             return Err(Error::FeatureNotPresent(format!(
                 "a shader stage {stage:?}"
@@ -147,7 +173,7 @@ impl<'a> Stages<'a> {
                 (first, None) => Ok(first.map(|(_, stage)| stage)),
             }
         };
-        let vertex = find(vk::ShaderStageFlags::VERTEX)?.ok_or_else(|| {
+        let vertex = find(F::VERTEX)?.ok_or_else(|| {
             Error::usage(
                 "VUID-VkGraphicsPipelineCreateInfo-stage-02096",
                 format!(
@@ -156,12 +182,109 @@ impl<'a> Stages<'a> {
                 ),
             )
         })?;
-        let fragment = find(vk::ShaderStageFlags::FRAGMENT)?;
+        let control = find(F::TESSELLATION_CONTROL)?;
+        let evaluation = find(F::TESSELLATION_EVALUATION)?;
+        let tessellation = match (control, evaluation) {
+            (None, None) => None,
+            (Some(control), Some(evaluation)) => Some([control, evaluation]),
+            (Some(_), None) => {
+                return Err(Error::usage(
+                    "VUID-VkGraphicsPipelineCreateInfo-pStages-00729",
+                    "there is a tessellation control stage without an evaluation stage",
+                ));
+            }
+            (None, Some(_)) => {
+                return Err(Error::usage(
+                    "VUID-VkGraphicsPipelineCreateInfo-pStages-00730",
+                    "there is a tessellation evaluation stage without a control stage",
+                ));
+            }
+        };
+        let geometry = find(F::GEOMETRY)?;
+        let fragment = find(F::FRAGMENT)?;
+        require_features(device, tessellation.is_some(), geometry.is_some())?;
+        check_patches(info, tessellation.is_some())?;
         Ok(Self {
             vertex,
+            tessellation,
+            geometry,
             fragment: fragment.filter(|_| !info.discards()),
         })
     }
+
+    /// Translates all stages.
+    fn translate(
+        &self,
+        device: &Device,
+        layout: &PipelineLayout,
+        samples: u32,
+    ) -> Result<StageShaders, Error> {
+        let translate =
+            |stage: &ShaderStage, kind| stages::translate(device, layout, stage, kind, samples);
+        let optional = |stage: Option<&ShaderStage>, kind| {
+            stage.map(|stage| translate(stage, kind)).transpose()
+        };
+        Ok(StageShaders {
+            vertex: translate(self.vertex, Stage::Vertex)?,
+            tessellation: match self.tessellation {
+                Some([control, evaluation]) => Some(TessellationShaders {
+                    control: translate(control, Stage::TessellationControl)?,
+                    evaluation: translate(evaluation, Stage::TessellationEvaluation)?,
+                }),
+                None => None,
+            },
+            geometry: optional(self.geometry, Stage::Geometry)?,
+            fragment: optional(self.fragment, Stage::Fragment)?,
+        })
+    }
+}
+
+/// Refuses stages whose features are not enabled.
+fn require_features(device: &Device, tessellates: bool, has_geometry: bool) -> Result<(), Error> {
+    let features = device.features();
+    if tessellates && !features.tessellation_shader {
+        return Err(Error::usage(
+            "VUID-VkPipelineShaderStageCreateInfo-stage-00705",
+            "the pipeline has tessellation stages, and tessellationShader is not enabled",
+        ));
+    }
+    if has_geometry && !features.geometry_shader {
+        return Err(Error::usage(
+            "VUID-VkPipelineShaderStageCreateInfo-stage-00704",
+            "the pipeline has a geometry stage, and geometryShader is not enabled",
+        ));
+    }
+    Ok(())
+}
+
+/// Refuses patches without tessellation, and tessellation of other primitives.
+fn check_patches(info: &GraphicsState, tessellates: bool) -> Result<(), Error> {
+    let topology = info.vertex_input.topology;
+    let has_patches = topology == vk::PrimitiveTopology::PATCH_LIST;
+    if has_patches && !tessellates {
+        return Err(Error::usage(
+            "VUID-VkGraphicsPipelineCreateInfo-topology-08889",
+            "the topology is PATCH_LIST, and there are no tessellation stages",
+        ));
+    }
+    if tessellates && !has_patches && !info.is_dynamic(vk::DynamicState::PRIMITIVE_TOPOLOGY) {
+        return Err(Error::usage(
+            "VUID-VkGraphicsPipelineCreateInfo-pStages-00736",
+            format!("there are tessellation stages, and the topology is {topology:?}"),
+        ));
+    }
+    let points = info.pre_rasterization.patch_control_points;
+    let is_dynamic = info.is_dynamic(vk::DynamicState::PATCH_CONTROL_POINTS_EXT);
+    if tessellates && !is_dynamic && !(1..=limits::MAX_PATCH_SIZE).contains(&points) {
+        return Err(Error::usage(
+            "VUID-VkPipelineTessellationStateCreateInfo-patchControlPoints-01214",
+            format!(
+                "patchControlPoints is {points}, not 1 to maxTessellationPatchSize ({})",
+                limits::MAX_PATCH_SIZE
+            ),
+        ));
+    }
+    Ok(())
 }
 
 /// The dynamic states, and the sources of viewports and scissors.

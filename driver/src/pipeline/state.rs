@@ -104,6 +104,10 @@ pub(crate) struct PreRasterizationState<'a> {
     pub(crate) rasterization: vk::PipelineRasterizationStateCreateInfo<'a>,
     /// True if the provoking vertex is a primitive's last, not its first.
     pub(crate) provoking_last: bool,
+    /// The number of vertices of a patch; 0 if the pipeline doesn't say.
+    pub(crate) patch_control_points: u32,
+    /// True if the origin of the domain of patches is the lower left.
+    pub(crate) lower_left_domain: bool,
     /// True if primitives are clipped at the near and far planes; None if the pipeline doesn't say.
     pub(crate) depth_clip: Option<bool>,
     /// The line rasterization state.
@@ -183,6 +187,17 @@ impl<'a> GraphicsState<'a> {
                 gathered.vertex_input.primitive_restart =
                     state.primitive_restart_enable != vk::FALSE;
             }
+            if gathered.tessellates()
+                && let Some(state) = valid::optional(info.p_tessellation_state)
+            {
+                gathered.pre_rasterization.patch_control_points = state.patch_control_points;
+                let origin = valid::find_in_chain::<
+                    vk::PipelineTessellationDomainOriginStateCreateInfo<'_>,
+                >(state.p_next);
+                gathered.pre_rasterization.lower_left_domain = origin.is_some_and(|state| {
+                    state.domain_origin == vk::TessellationDomainOrigin::LOWER_LEFT
+                });
+            }
             if let Some(state) = valid::optional(info.p_rasterization_state) {
                 gathered.pre_rasterization.rasterization = *state;
                 let provoking = valid::find_in_chain::<
@@ -214,6 +229,13 @@ impl<'a> GraphicsState<'a> {
     pub(crate) fn stages(&self) -> impl Iterator<Item = &(vk::ShaderStageFlags, ShaderStage<'a>)> {
         let (before, fragment) = (&self.pre_rasterization.stages, &self.fragment_shader.stages);
         before.iter().chain(fragment)
+    }
+
+    /// Reports whether there are tessellation stages.
+    pub(crate) fn tessellates(&self) -> bool {
+        let both = vk::ShaderStageFlags::TESSELLATION_CONTROL
+            | vk::ShaderStageFlags::TESSELLATION_EVALUATION;
+        self.stages().any(|(stage, _)| both.contains(*stage))
     }
 
     /// Reports whether a state is dynamic.
@@ -645,6 +667,8 @@ macro_rules! supported {
 pub(crate) struct FixedFunctionState {
     /// All state except depth bias, depth, stencil, logic operations and the state of single colour attachments.
     pub(crate) draw: DrawState,
+    /// The number of vertices of a patch.
+    pub(super) patch_control_points: u32,
     pub(super) depth_bias_enable: bool,
     pub(super) depth_bias: DepthBias,
     pub(super) depth_test: bool,
@@ -777,6 +801,7 @@ impl FixedFunctionState {
             depth_bias: None,
             line_width: info.line_width(),
             provoking_last: info.pre_rasterization.provoking_last,
+            lower_left_domain: info.pre_rasterization.lower_left_domain,
             samples: 1,
             sample_mask: u32::MAX,
             sample_shading: false,
@@ -793,6 +818,7 @@ impl FixedFunctionState {
         };
         let mut state = Self {
             draw,
+            patch_control_points: info.pre_rasterization.patch_control_points,
             depth_bias_enable: raster.depth_bias_enable != vk::FALSE,
             depth_bias: DepthBias {
                 constant: raster.depth_bias_constant_factor,
@@ -997,6 +1023,16 @@ impl FixedFunctionState {
         self.rasterizes() && are_lines
     }
 
+    /// Reports whether patches are drawn.
+    pub(super) fn draws_patches(&self) -> bool {
+        class(self.draw.topology) == Class::Patches
+    }
+
+    /// Sets the number of vertices of a patch.
+    pub(super) fn set_patch_control_points(&mut self, count: u32) {
+        self.patch_control_points = count.min(limits::MAX_PATCH_SIZE);
+    }
+
     /// Reports whether depth bias is enabled.
     pub(super) fn biases_depth(&self) -> bool {
         self.rasterizes() && self.depth_bias_enable
@@ -1086,6 +1122,12 @@ impl FixedFunctionState {
                 bounds: self.depth_bounds_test.then_some(self.depth_bounds),
                 stencil: self.stencil_test.then_some(self.stencil),
             },
+            topology: match self.draw.topology {
+                Topology::PatchList { .. } => Topology::PatchList {
+                    control_points: self.patch_control_points,
+                },
+                other => other,
+            },
             logic_op: self.logic_op_enable.then_some(self.logic_op),
             blend: self.attachments.iter().map(|it| it.blend_state()).collect(),
             ..self.draw.clone()
@@ -1128,6 +1170,8 @@ pub(crate) enum Class {
     Lines,
     /// Triangles.
     Triangles,
+    /// Patches.
+    Patches,
 }
 
 /// The class of a topology. A dynamic topology must stay in its class.
@@ -1143,6 +1187,7 @@ pub(crate) fn class(topology: Topology) -> Class {
         | Topology::TriangleFan
         | Topology::TriangleListWithAdjacency
         | Topology::TriangleStripWithAdjacency => Class::Triangles,
+        Topology::PatchList { .. } => Class::Patches,
     }
 }
 

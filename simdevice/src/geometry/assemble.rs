@@ -17,7 +17,10 @@ pub(super) fn corner_count(topology: Topology) -> usize {
     match topology {
         PointList => 1,
         LineList | LineStrip | LineListWithAdjacency | LineStripWithAdjacency => 2,
-        _ => 3,
+        TriangleList | TriangleStrip | TriangleFan => 3,
+        TriangleListWithAdjacency | TriangleStripWithAdjacency => 3,
+        // Tessellation decides.
+        PatchList { .. } => 3,
     }
 }
 
@@ -34,6 +37,46 @@ pub(super) fn primitive_count(topology: Topology, vertices: u32) -> u32 {
         LineStripWithAdjacency => vertices.saturating_sub(3),
         TriangleListWithAdjacency => vertices / 6,
         TriangleStripWithAdjacency => vertices.saturating_sub(4) / 2,
+        PatchList { control_points } => vertices / control_points.max(1),
+    }
+}
+
+/// The number of vertices of a primitive, adjacent ones and those of a patch included.
+pub(super) fn vertex_count(topology: Topology) -> usize {
+    use Topology::*;
+    match topology {
+        PatchList { control_points } => control_points as usize,
+        LineListWithAdjacency | LineStripWithAdjacency => 4,
+        TriangleListWithAdjacency | TriangleStripWithAdjacency => 6,
+        other => corner_count(other),
+    }
+}
+
+/// The places of all vertices of primitive `number` of a run: its corners with adjacent vertices between, or a patch.
+/// `is_last` tells if it is the run's last primitive.
+pub(super) fn vertices(topology: Topology, number: u32, is_last: bool, places: &mut Vec<u32>) {
+    use Topology::*;
+    let i = number;
+    places.clear();
+    match topology {
+        PatchList { control_points } => {
+            places.extend((0..control_points).map(|vertex| i * control_points + vertex));
+        }
+        LineListWithAdjacency => places.extend(4 * i..4 * i + 4),
+        LineStripWithAdjacency => places.extend(i..i + 4),
+        TriangleListWithAdjacency => places.extend(6 * i..6 * i + 6),
+        TriangleStripWithAdjacency => {
+            let [a, b, c] = corners(topology, false, i).places;
+            let before = if i == 0 { 1 } else { 2 * i - 2 };
+            let after = if is_last { 2 * i + 5 } else { 2 * i + 6 };
+            let beside = 2 * i + 3;
+            places.extend(if i.is_multiple_of(2) {
+                [a, before, b, after, c, beside]
+            } else {
+                [a, beside, b, after, c, before]
+            });
+        }
+        other => places.extend(&corners(other, false, i).places[..corner_count(other)]),
     }
 }
 
@@ -58,6 +101,7 @@ pub(super) fn corners(topology: Topology, last: bool, number: u32) -> Corners {
             [2 * i, 2 * i + 2 + 2 * odd, 2 * i + 4 - 2 * odd],
             [0, 2 - odd as usize],
         ),
+        PatchList { control_points } => ([control_points * i; 3], [0, 0]),
     };
     Corners {
         places,
@@ -65,7 +109,7 @@ pub(super) fn corners(topology: Topology, last: bool, number: u32) -> Corners {
     }
 }
 
-/// The range of places that primitives `first..end` use. A fan also uses place 0 ([`uses_pivot`]).
+/// The range of places that primitives `first..end` use; it may end beyond the run. A fan also uses place 0 ([`uses_pivot`]).
 pub(super) fn places(topology: Topology, first: u32, end: u32) -> std::ops::Range<u32> {
     use Topology::*;
     match topology {
@@ -78,7 +122,9 @@ pub(super) fn places(topology: Topology, first: u32, end: u32) -> std::ops::Rang
         LineListWithAdjacency => 4 * first..4 * end,
         LineStripWithAdjacency => first..end + 3,
         TriangleListWithAdjacency => 6 * first..6 * end,
-        TriangleStripWithAdjacency => 2 * first..2 * end + 4,
+        // Both neighbours of a strip's triangles may have vertices beyond the range.
+        TriangleStripWithAdjacency => (2 * first).saturating_sub(2)..2 * end + 5,
+        PatchList { control_points } => control_points * first..control_points * end,
     }
 }
 

@@ -70,7 +70,7 @@ impl PrimitiveDraw {
 }
 
 impl PrimitiveSegment {
-    fn memory_bytes(&self) -> u64 {
+    pub(super) fn memory_bytes(&self) -> u64 {
         let primitives = size_of_val(&*self.primitives);
         let varyings = size_of_val(&*self.varyings.values);
         (primitives + varyings + self.bins.memory_bytes()) as u64

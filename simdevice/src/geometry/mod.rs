@@ -6,6 +6,9 @@
 //! attributes), [`shade`] (the vertex program and the [`viewport`]), [`assemble`] and [`setup`] (primitives,
 //! [`clip`]ped, culled, with [`depth_bias`]); [`bins`] lists the primitives of each macro-tile. Vertices on the border
 //! of two segments are shaded in both.
+//!
+//! Tessellation and geometry programs ([`tessellation_shader`], [`geometry_shader`]) take the assembled primitives and
+//! leave others ([`primitive_list`]), which are set up in pieces.
 
 mod assemble;
 mod bins;
@@ -13,11 +16,17 @@ mod clip;
 mod depth_bias;
 mod draw;
 mod fetch;
+mod geometry_shader;
 mod order;
+mod pieces;
 pub(crate) mod points;
 mod primitive;
+mod primitive_list;
+mod primitive_stage;
+mod primitive_stages;
 mod setup;
 mod shade;
+mod tessellation_shader;
 #[cfg(test)]
 mod tests;
 mod vertex_reuse;
@@ -31,8 +40,9 @@ use crate::format::Format;
 use crate::packet::Draw;
 use crate::program::bindings::BoundResources;
 use crate::program::interface::VertexInput;
+use crate::program::vertex::VertexOutputs;
 use crate::runtime::Runtime;
-use crate::state::{DrawState, PolygonMode, Rect};
+use crate::state::{PolygonMode, Rect};
 use crate::stats::counters::{Counter, Counters};
 use assemble::corner_count;
 use bins::Grid;
@@ -42,8 +52,11 @@ use fetch::Fetcher;
 use isa::ir::Rate;
 use isa::machine::{Stopped, Watchdog};
 use isa::resources::Resources;
-use setup::{Output, SegmentSetup, Setup};
-use shade::{Shaded, Shader};
+use pieces::Pieces;
+use primitive_stage::Environment;
+use primitive_stages::{PrimitiveStages, StageBindings, StageResources};
+use setup::Setup;
+use shade::{OutputReader, Shaded, Shader};
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 use vertex_reuse::{RestartRun, VertexReuse, runs};
@@ -54,6 +67,16 @@ const SEGMENT: u64 = 2048;
 
 /// The number of segments in a part. A part is set up before any of it is rendered.
 const PART_SEGMENTS: u64 = 512;
+
+/// The number of primitives in a segment if programs make others of them: of patches, and without tessellation.
+const SEGMENT_OF_PATCHES: u64 = 16;
+const SEGMENT_OF_GEOMETRY: u64 = 256;
+
+/// The number of such segments that are processed before the memory of the part is looked at.
+const STEP_SEGMENTS: u64 = 16;
+
+/// The bytes of host memory after which a part of such segments ends.
+const PART_BYTES: u64 = 64 << 20;
 
 /// The target of a draw.
 #[derive(Clone, Copy, Debug)]
@@ -75,11 +98,14 @@ pub(crate) struct FrontEnd<'a> {
     runtime: &'a Runtime,
     surface: Surface,
     prepared: BoundResources<'a>,
+    prepared_stages: StageBindings<'a>,
     runs: Vec<RestartRun>,
     transforms: Vec<Transform>,
     regions: Vec<Rect>,
     /// The number of primitives of an instance.
     primitives: u64,
+    /// The number of primitives in a segment.
+    segment: u64,
     /// True if a segment may have primitives of several instances.
     mixes_instances: bool,
     segments: u64,
@@ -107,10 +133,15 @@ impl<'a> FrontEnd<'a> {
             .map(|run| u64::from(run.primitives))
             .sum::<u64>();
         let mixes_instances = mixes_instances(draw);
+        let segment = match (&draw.pipeline.tessellation, &draw.pipeline.geometry) {
+            (Some(_), _) => SEGMENT_OF_PATCHES,
+            (None, Some(_)) => SEGMENT_OF_GEOMETRY,
+            (None, None) => SEGMENT,
+        };
         let segments = if mixes_instances {
-            primitives.saturating_mul(instances).div_ceil(SEGMENT)
+            primitives.saturating_mul(instances).div_ceil(segment)
         } else {
-            primitives.div_ceil(SEGMENT).saturating_mul(instances)
+            primitives.div_ceil(segment).saturating_mul(instances)
         };
         let viewports = state.viewports.iter();
         let clip_depth = state.depth_clip.unwrap_or(!state.depth_clamp);
@@ -129,10 +160,12 @@ impl<'a> FrontEnd<'a> {
             runtime,
             surface,
             prepared: draw.vertex_bindings.bind(runtime.level()),
+            prepared_stages: StageBindings::new(draw, runtime.level()),
             runs,
             transforms: transforms.take(state.scissors.len()).collect(),
             regions: regions.collect(),
             primitives,
+            segment,
             mixes_instances,
             segments,
             next: 0,
@@ -148,10 +181,15 @@ impl<'a> FrontEnd<'a> {
             return Ok(None);
         }
         let started = Instant::now();
-        let range = self.next..self.segments.min(self.next + PART_SEGMENTS);
-        self.next = range.end;
-        let done = self.process(range, counters);
+        let done = if self.segment == SEGMENT {
+            let range = self.next..self.segments.min(self.next + PART_SEGMENTS);
+            self.next = range.end;
+            self.process(range, counters)
+        } else {
+            self.process_steps(counters)
+        };
         self.draw.vertex_bindings.bump_generations();
+        self.prepared_stages.bump_generations();
         let part = done.map(|segments| PrimitiveDraw {
             segments,
             regions: self.regions.clone(),
@@ -159,6 +197,21 @@ impl<'a> FrontEnd<'a> {
         });
         counters.add(Counter::GeometryTime, started.elapsed().as_nanos() as u64);
         part.map(Some)
+    }
+
+    /// Processes segments until they hold enough memory, since nothing tells before how many primitives they become.
+    fn process_steps(&mut self, counters: &mut Counters) -> Result<Vec<PrimitiveSegment>, Stopped> {
+        let mut done: Vec<PrimitiveSegment> = Vec::new();
+        let mut bytes = 0;
+        while self.next < self.segments && bytes < PART_BYTES {
+            let range = self.next..self.segments.min(self.next + STEP_SEGMENTS);
+            self.next = range.end;
+            let step = self.process(range, counters)?;
+            bytes += step.iter().map(PrimitiveSegment::memory_bytes).sum::<u64>();
+            host::reserve(&mut done, step.len());
+            done.extend(step);
+        }
+        Ok(done)
     }
 
     /// Processes segments on all workers. The result is in the order of segments.
@@ -169,7 +222,8 @@ impl<'a> FrontEnd<'a> {
     ) -> Result<Vec<PrimitiveSegment>, Stopped> {
         let setup = Setup {
             state: &self.draw.state,
-            outputs: &self.draw.pipeline.vertex.outputs,
+            outputs: self.draw.pipeline.last_outputs(),
+            corners: corners_drawn(self.draw),
             transforms: &self.transforms,
             regions: &self.regions,
             grid: self.grid(),
@@ -178,22 +232,24 @@ impl<'a> FrontEnd<'a> {
             depth_unit: DepthUnit::of(self.surface.depth),
         };
         let resources = self.prepared.resources();
+        let stage_resources = self.prepared_stages.resources();
         let cancel = AtomicBool::new(false);
         let (workers, ran) = self.runtime.share(
             range,
             1,
             &cancel,
-            || Worker::new(self, &setup, &resources, &cancel),
+            || Worker::new(self, &setup, &resources, &stage_resources, &cancel),
             Worker::run_segment,
         );
         ran?;
         let mut done = Vec::new();
         for worker in workers {
-            counters.add_all(&worker.counters);
-            host::reserve(&mut done, worker.done.len());
-            done.extend(worker.done);
+            let finished = worker.finished;
+            counters.add_all(&finished.counters);
+            host::reserve(&mut done, finished.segments.len());
+            done.extend(finished.segments);
         }
-        done.sort_unstable_by_key(|(segment, _)| *segment);
+        done.sort_unstable_by_key(|(place, _)| *place);
         Ok(host::collect(done.into_iter().map(|(_, segment)| segment)))
     }
 
@@ -207,12 +263,18 @@ impl<'a> FrontEnd<'a> {
             .primitives
             .saturating_mul(self.draw.instance_count.into());
         let (mut at, end) = if self.mixes_instances {
-            (segment * SEGMENT, total.min((segment + 1) * SEGMENT))
+            (
+                segment * self.segment,
+                total.min((segment + 1) * self.segment),
+            )
         } else {
-            let per_instance = self.primitives.div_ceil(SEGMENT);
+            let per_instance = self.primitives.div_ceil(self.segment);
             let start = segment / per_instance * self.primitives;
-            let first = segment % per_instance * SEGMENT;
-            (start + first, start + self.primitives.min(first + SEGMENT))
+            let first = segment % per_instance * self.segment;
+            (
+                start + first,
+                start + self.primitives.min(first + self.segment),
+            )
         };
         while at < end {
             let (instance, primitive) = (at / self.primitives, at % self.primitives);
@@ -245,23 +307,24 @@ fn mixes_instances(draw: &Draw) -> bool {
         .any(|&(_, rate, input)| rate == Rate::Uniform && depends(input))
 }
 
-/// True if primitives may become points.
-fn draws_points(state: &DrawState) -> bool {
-    corner_count(state.topology) == 1 || state.polygon_mode == PolygonMode::Point
+/// The number of corners of the primitives that are drawn: 1 for points, 2 for lines, 3 for triangles.
+fn corners_drawn(draw: &Draw) -> usize {
+    match (&draw.pipeline.geometry, &draw.pipeline.tessellation) {
+        (Some(geometry), _) => geometry.corners,
+        (None, Some(stage)) => stage.tessellation.corners(),
+        (None, None) => corner_count(draw.state.topology),
+    }
 }
 
 /// The state of one worker that processes segments.
 struct Worker<'a> {
     front: &'a FrontEnd<'a>,
-    setup: &'a Setup<'a>,
     shader: Shader<'a>,
     reuse: VertexReuse,
     shaded: Shaded,
-    numbers: Vec<u32>,
-    output: Output,
-    counters: Counters,
-    /// The segments that have primitives, with their numbers.
-    done: Vec<(u64, PrimitiveSegment)>,
+    /// The programs that make other primitives.
+    stages: Option<PrimitiveStages<'a>>,
+    finished: Pieces<'a>,
 }
 
 impl<'a> Worker<'a> {
@@ -269,32 +332,41 @@ impl<'a> Worker<'a> {
         front: &'a FrontEnd<'a>,
         setup: &'a Setup<'a>,
         resources: &'a Resources<'a>,
+        stage_resources: &'a StageResources<'a>,
         cancel: &'a AtomicBool,
     ) -> Self {
-        let mut machine = front.draw.pipeline.vertex.machines.lend();
-        let shader = Shader {
-            fetcher: Fetcher::new(front.draw, front.surface.view.unwrap_or(0), &mut machine),
-            machine,
-            outputs: setup.outputs,
-            takes_optional: setup.outputs.has_optional(draws_points(setup.state)),
-            level: front.runtime.level(),
-            transform: front.transforms.first().copied().unwrap_or(Transform::NONE),
-            resources,
-            watchdog: Watchdog {
-                limit: front.runtime.config().shader_timeout,
-                cancel: Some(cancel),
-            },
+        let pipeline = &front.draw.pipeline;
+        let mut machine = pipeline.vertex.machines.lend();
+        let view = front.surface.view.unwrap_or(0);
+        let watchdog = Watchdog {
+            limit: front.runtime.config().shader_timeout,
+            cancel: Some(cancel),
         };
+        let draws_points = setup.corners == 1 || setup.state.polygon_mode == PolygonMode::Point;
+        let level = front.runtime.level();
+        let transform = front.transforms.first().copied().unwrap_or(Transform::NONE);
+        // Only the last program's outputs but varyings are needed.
+        let reader = |outputs: &'a VertexOutputs| OutputReader {
+            outputs,
+            takes_optional: std::ptr::eq(outputs, setup.outputs)
+                && outputs.has_optional(draws_points),
+            level,
+            transform,
+        };
+        let environment = Environment { watchdog, view };
         Self {
             front,
-            setup,
-            shader,
+            shader: Shader {
+                fetcher: Fetcher::new(front.draw, view, &mut machine),
+                machine,
+                reader: reader(&pipeline.vertex.outputs),
+                resources,
+                watchdog,
+            },
             reuse: VertexReuse::default(),
             shaded: Shaded::default(),
-            numbers: Vec::new(),
-            output: Output::default(),
-            counters: Counters::default(),
-            done: Vec::new(),
+            stages: PrimitiveStages::new(front.draw, &reader, stage_resources, environment),
+            finished: Pieces::new(setup),
         }
     }
 
@@ -306,41 +378,21 @@ impl<'a> Worker<'a> {
             reuse.push(front.draw, run, instance, first, end);
         });
         let ran = self.shader.shade(reuse, &mut self.shaded);
-        let (output, counters) = (&mut self.output, &mut self.counters);
-        output.clear();
+        let finished = &mut self.finished;
+        let counters = &mut finished.counters;
         counters.add_work(&self.shader.machine.take_work());
         counters.add(Counter::VertexInvocations, reuse.vertices.len() as u64);
+        counters.add(Counter::InputPrimitives, reuse.primitives());
         ran?;
-        if front.draw.state.rasterizer_discard || self.setup.transforms.is_empty() {
-            output.assembled = reuse.primitives();
-        } else {
-            SegmentSetup::new(self.setup, &self.shaded, &mut self.numbers, output).run(reuse);
+        if let Some(stages) = &mut self.stages {
+            return stages.run(reuse, &self.shaded, segment, finished);
         }
-        counters.add(Counter::InputPrimitives, output.assembled);
-        counters.add(Counter::ClippingInvocations, output.assembled);
-        counters.add(Counter::ClippingPrimitives, output.clipped);
-        counters.add(Counter::PrimitivesDrawn, output.primitives.len() as u64);
-        if !output.primitives.is_empty() {
-            let kept = self.keep();
-            host::push(&mut self.done, (segment, kept));
+        if finished.discards {
+            counters.add(Counter::ClippingInvocations, reuse.primitives());
+            return Ok(());
         }
+        finished.begin(&self.shaded).run(reuse);
+        finished.keep((segment, 0));
         Ok(())
-    }
-
-    /// The result of the last segment, copied to memory of its size, with lists by macro-tile.
-    fn keep(&mut self) -> PrimitiveSegment {
-        let (output, setup) = (&self.output, self.setup);
-        let started = Instant::now();
-        let mut bins = Bins::new(&setup.grid, setup.layers, &output.pairs);
-        let per_vertex = setup.outputs.varyings.len();
-        let (primitives, values) = order::in_order(output, per_vertex, &mut bins, order::FEW);
-        self.counters.add(Counter::BinnedPairs, bins.pairs());
-        let elapsed = started.elapsed().as_nanos() as u64;
-        self.counters.add(Counter::BinningTime, elapsed);
-        PrimitiveSegment {
-            primitives,
-            varyings: Varyings { values, per_vertex },
-            bins,
-        }
     }
 }

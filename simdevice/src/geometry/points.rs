@@ -2,7 +2,7 @@
 //! project Gaussians.
 
 use super::fetch::Fetcher;
-use super::shade::{Shaded, Shader};
+use super::shade::{OutputReader, Shaded, Shader};
 use super::vertex_reuse::{RestartRun, VertexReuse};
 use super::viewport::Transform;
 use crate::packet::Draw;
@@ -36,10 +36,12 @@ impl<'a> PointShader<'a> {
             shader: Shader {
                 fetcher: Fetcher::new(draw, view, &mut machine),
                 machine,
-                outputs: &program.outputs,
-                takes_optional: false,
-                level: runtime.level(),
-                transform: Transform::NONE,
+                reader: OutputReader {
+                    outputs: &program.outputs,
+                    takes_optional: false,
+                    level: runtime.level(),
+                    transform: Transform::NONE,
+                },
                 resources,
                 watchdog: Watchdog {
                     limit: runtime.config().shader_timeout,
@@ -53,7 +55,7 @@ impl<'a> PointShader<'a> {
 
     /// True if the program writes a varying.
     pub(crate) fn writes(&self, varying: u32) -> bool {
-        let varyings = &self.shader.outputs.varyings;
+        let varyings = &self.shader.reader.outputs.varyings;
         varyings.get(varying as usize).is_some_and(Option::is_some)
     }
 
@@ -72,6 +74,7 @@ impl<'a> PointShader<'a> {
             start: 0,
             primitives_before: 0,
             primitives: self.draw.count,
+            vertices: self.draw.count,
         };
         self.reuse.clear();
         self.reuse.push(self.draw, &run, instance, first, end);
@@ -88,7 +91,7 @@ impl<'a> PointShader<'a> {
         let slots = pieces.flat_map(|piece| {
             (piece.first..piece.end).map(|place| self.reuse.slot(piece, place) as usize)
         });
-        let per_vertex = self.shader.outputs.varyings.len();
+        let per_vertex = self.shader.reader.outputs.varyings.len();
         slots.map(move |slot| {
             let varyings = &self.shaded.varyings[slot * per_vertex..(slot + 1) * per_vertex];
             (self.shaded.vertices[slot].position, varyings)

@@ -1,10 +1,11 @@
 //! Primitive set-up: clips and culls assembled primitives, and converts them to the rasterizer's form.
 
-use super::assemble::{corner_count, corners};
+use super::assemble::corners;
 use super::bins::{Grid, Pair};
 use super::clip::{ClipVertex, Clipper, MOST_VERTICES};
 use super::depth_bias::{self, DepthUnit};
 use super::primitive::Primitive;
+use super::primitive_list::ListedPrimitive;
 use super::shade::{NO_OPTIONAL_OUTPUTS, OptionalOutputs, Shaded, Vertex};
 use super::vertex_reuse::VertexReuse;
 use super::viewport::{Transform, WindowVertex, code};
@@ -45,7 +46,10 @@ impl Output {
 /// The inputs of set-up that a whole draw shares.
 pub(super) struct Setup<'a> {
     pub state: &'a DrawState,
+    /// The outputs of the last program.
     pub outputs: &'a VertexOutputs,
+    /// The number of corners of the primitives: 1 to 3.
+    pub corners: usize,
     /// The transform of each viewport.
     pub transforms: &'a [Transform],
     /// The pixels that may be touched, by viewport.
@@ -118,7 +122,7 @@ impl<'a> SegmentSetup<'a> {
     /// Sets up all primitives of a segment.
     pub(super) fn run(mut self, reuse: &VertexReuse) {
         let state = self.setup.state;
-        let count = corner_count(state.topology);
+        let count = self.setup.corners;
         for piece in &reuse.pieces {
             for number in piece.first..piece.end {
                 let found = corners(state.topology, state.provoking_last, number);
@@ -132,13 +136,41 @@ impl<'a> SegmentSetup<'a> {
                     front: true,
                 };
                 self.choose_target(&mut current);
-                match count {
-                    1 => self.with_vertices(&mut current, Self::point),
-                    2 => self.with_vertices(&mut current, Self::line),
-                    _ => self.with_vertices(&mut current, Self::triangle),
-                }
+                self.primitive(count, &mut current);
             }
             self.out.assembled += u64::from(piece.end - piece.first);
+        }
+    }
+
+    /// Sets up primitives that programs made.
+    pub(super) fn run_list(mut self, primitives: &[ListedPrimitive]) {
+        let names_primitives = self.setup.outputs.primitive_id.is_some();
+        for primitive in primitives {
+            let mut current = AssembledPrimitive {
+                id: if names_primitives {
+                    self.optional(primitive.provoking).primitive_id
+                } else {
+                    primitive.id
+                },
+                slots: primitive.slots,
+                provoking: primitive.provoking,
+                viewport: 0,
+                layer: 0,
+                front: true,
+            };
+            self.choose_target(&mut current);
+            self.primitive(self.setup.corners, &mut current);
+        }
+        self.out.assembled += primitives.len() as u64;
+    }
+
+    /// Sets up a primitive of `corners` corners.
+    #[inline(always)]
+    fn primitive(&mut self, corners: usize, current: &mut AssembledPrimitive) {
+        match corners {
+            1 => self.with_vertices(current, Self::point),
+            2 => self.with_vertices(current, Self::line),
+            _ => self.with_vertices(current, Self::triangle),
         }
     }
 

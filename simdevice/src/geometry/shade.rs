@@ -10,7 +10,7 @@ use devmem::dispatch;
 use devmem::host;
 use fearless_simd::Level;
 use isa::Vector;
-use isa::machine::{LaneMask, Machine, Stopped, Watchdog};
+use isa::machine::{LaneMask, Stopped, Watchdog};
 use isa::resources::Resources;
 
 /// A vertex after the vertex program and the first viewport's transform.
@@ -29,6 +29,7 @@ pub(super) struct OptionalOutputs {
     pub point_size: f32,
     pub layer: u32,
     pub viewport: u32,
+    pub primitive_id: u32,
     pub clip: [f32; MAX_CLIP_CULL_DISTANCES],
     pub cull: [f32; MAX_CLIP_CULL_DISTANCES],
 }
@@ -38,6 +39,7 @@ pub(super) const NO_OPTIONAL_OUTPUTS: OptionalOutputs = OptionalOutputs {
     point_size: 1.0,
     layer: 0,
     viewport: 0,
+    primitive_id: 0,
     clip: [0.0; MAX_CLIP_CULL_DISTANCES],
     cull: [0.0; MAX_CLIP_CULL_DISTANCES],
 };
@@ -50,19 +52,60 @@ pub(super) struct Shaded {
     pub optional: Vec<OptionalOutputs>,
     /// The varyings, vertex by vertex.
     pub varyings: Vec<u32>,
+    /// The number of varyings of a vertex.
+    pub per_vertex: usize,
+}
+
+/// The varyings of vertices, which are the values that the next program takes.
+#[derive(Clone, Copy)]
+pub(super) struct Vertices<'a> {
+    /// The values, vertex by vertex.
+    pub values: &'a [u32],
+    /// The number of values of a vertex.
+    pub per_vertex: usize,
+}
+
+impl<'a> Vertices<'a> {
+    /// The values of the vertex in a slot.
+    pub(super) fn vertex(self, slot: u32) -> &'a [u32] {
+        &self.values[slot as usize * self.per_vertex..][..self.per_vertex]
+    }
+}
+
+impl Shaded {
+    /// The varyings.
+    pub(super) fn values(&self) -> Vertices<'_> {
+        Vertices {
+            values: &self.varyings,
+            per_vertex: self.per_vertex,
+        }
+    }
+
+    /// Removes all vertices.
+    pub(super) fn clear(&mut self) {
+        self.vertices.clear();
+        self.optional.clear();
+        self.varyings.clear();
+    }
 }
 
 /// Runs the vertex program on batches.
 pub(super) struct Shader<'a> {
     pub machine: PooledMachine<'a>,
     pub fetcher: Fetcher<'a>,
+    pub reader: OutputReader<'a>,
+    pub resources: &'a Resources<'a>,
+    pub watchdog: Watchdog<'a>,
+}
+
+/// Reads the outputs of a batch of vertices, and projects their positions.
+#[derive(Clone, Copy)]
+pub(super) struct OutputReader<'a> {
     pub outputs: &'a VertexOutputs,
     /// True if outputs other than positions and varyings are needed.
     pub takes_optional: bool,
     pub level: Level,
     pub transform: Transform,
-    pub resources: &'a Resources<'a>,
-    pub watchdog: Watchdog<'a>,
 }
 
 impl Shader<'_> {
@@ -72,9 +115,7 @@ impl Shader<'_> {
         reuse: &VertexReuse,
         shaded: &mut Shaded,
     ) -> Result<(), Stopped> {
-        shaded.vertices.clear();
-        shaded.optional.clear();
-        shaded.varyings.clear();
+        shaded.clear();
         let batches = reuse
             .vertices
             .chunks(VERTEX_BATCH)
@@ -87,20 +128,28 @@ impl Shader<'_> {
                 self.resources,
                 self.watchdog,
             )?;
-            self.take(vertices.len(), shaded);
+            let machine = &self.machine;
+            let output = |slot| machine.output_vectors(slot);
+            self.reader.take(vertices.len(), output, shaded);
         }
         Ok(())
     }
+}
 
-    /// Appends a batch's outputs to `shaded`.
-    fn take(&self, count: usize, shaded: &mut Shaded) {
+impl OutputReader<'_> {
+    /// Appends the vertices of a batch to `shaded`. `output` gives the lanes of an output.
+    #[inline]
+    pub(super) fn take<'v>(
+        &self,
+        count: usize,
+        output: impl Fn(u32) -> &'v [Vector],
+        shaded: &mut Shaded,
+    ) {
         let outputs = self.outputs;
         let first = shaded.vertices.len();
         host::resize(&mut shaded.vertices, first + count, Vertex::default());
         let vertices = &mut shaded.vertices[first..];
-        let lanes = outputs
-            .position
-            .map(|slot| slot.map_or(&[][..], |slot| self.machine.output_vectors(slot)));
+        let lanes = outputs.position.map(|slot| slot.map_or(&[][..], &output));
         for (chunk, vertices) in vertices.chunks_mut(16).enumerate() {
             let mut position = [[0.0; 16]; 4];
             for (component, lanes) in position.iter_mut().zip(&lanes) {
@@ -128,15 +177,16 @@ impl Shader<'_> {
             }
         }
         if self.takes_optional {
-            self.take_optional(count, shaded);
+            self.take_optional(count, &output, shaded);
         }
         let per_vertex = outputs.varyings.len();
+        shaded.per_vertex = per_vertex;
         if per_vertex > 0 {
             let first = shaded.varyings.len();
             host::resize(&mut shaded.varyings, first + count * per_vertex, 0);
             for (number, &slot) in outputs.varyings.iter().enumerate() {
                 let mut vertices = shaded.varyings[first..].chunks_exact_mut(per_vertex);
-                let chunks = slot.map_or(&[][..], |slot| self.machine.output_vectors(slot));
+                let chunks = slot.map_or(&[][..], &output);
                 for chunk in chunks {
                     for (&bits, vertex) in chunk.0.iter().zip(&mut vertices) {
                         vertex[number] = bits;
@@ -152,26 +202,33 @@ impl Shader<'_> {
         dispatch!(self.level, _ => transform.project_all(position))
     }
 
-    fn take_optional(&self, count: usize, shaded: &mut Shaded) {
+    fn take_optional<'v>(
+        &self,
+        count: usize,
+        output: &impl Fn(u32) -> &'v [Vector],
+        shaded: &mut Shaded,
+    ) {
         let outputs = self.outputs;
         let first = shaded.optional.len();
         shaded.optional.resize(first + count, NO_OPTIONAL_OUTPUTS);
         let optional = &mut shaded.optional[first..];
-        let machine = &self.machine;
-        for_lanes(machine, outputs.point_size, optional, |optional, bits| {
+        for_lanes(output, outputs.point_size, optional, |optional, bits| {
             optional.point_size = f32::from_bits(bits);
         });
-        for_lanes(machine, outputs.layer, optional, |optional, bits| {
+        for_lanes(output, outputs.layer, optional, |optional, bits| {
             optional.layer = bits;
         });
-        for_lanes(machine, outputs.viewport, optional, |optional, bits| {
+        for_lanes(output, outputs.viewport, optional, |optional, bits| {
             optional.viewport = bits;
         });
+        for_lanes(output, outputs.primitive_id, optional, |optional, bits| {
+            optional.primitive_id = bits;
+        });
         for index in 0..MAX_CLIP_CULL_DISTANCES {
-            for_lanes(machine, outputs.clip[index], optional, |optional, bits| {
+            for_lanes(output, outputs.clip[index], optional, |optional, bits| {
                 optional.clip[index] = f32::from_bits(bits);
             });
-            for_lanes(machine, outputs.cull[index], optional, |optional, bits| {
+            for_lanes(output, outputs.cull[index], optional, |optional, bits| {
                 optional.cull[index] = f32::from_bits(bits);
             });
         }
@@ -203,11 +260,16 @@ fn distance_code(optional: &OptionalOutputs) -> u32 {
 }
 
 /// Calls `set` with each item and its lane of an output, if there is such an output.
-fn for_lanes<T>(machine: &Machine, slot: Option<u32>, items: &mut [T], set: impl Fn(&mut T, u32)) {
+fn for_lanes<'v, T>(
+    output: impl Fn(u32) -> &'v [Vector],
+    slot: Option<u32>,
+    items: &mut [T],
+    set: impl Fn(&mut T, u32),
+) {
     let Some(slot) = slot else {
         return;
     };
-    let chunks: &[Vector] = machine.output_vectors(slot);
+    let chunks = output(slot);
     for (chunk, items) in chunks.iter().zip(items.chunks_mut(16)) {
         for (&bits, item) in chunk.0.iter().zip(items) {
             set(item, bits);

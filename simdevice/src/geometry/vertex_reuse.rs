@@ -15,6 +15,8 @@ pub(super) struct RestartRun {
     pub primitives_before: u32,
     /// The number of its primitives.
     pub primitives: u32,
+    /// The number of its vertices.
+    pub vertices: u32,
 }
 
 /// The number of indices that are searched for restarts at a time.
@@ -70,6 +72,7 @@ impl Runs {
                 start,
                 primitives_before: self.primitives,
                 primitives,
+                vertices,
             };
             host::push(&mut self.runs, run);
             self.primitives += primitives;
@@ -86,6 +89,8 @@ pub(super) struct Piece {
     pub end: u32,
     /// The number of primitives before the run.
     pub primitives_before: u32,
+    /// The number of primitives of the run.
+    pub run_primitives: u32,
     /// The place in the run of its first element.
     base: u32,
     /// The index of its first element in [`VertexReuse::slots`].
@@ -136,6 +141,7 @@ impl VertexReuse {
     ) {
         let topology = draw.state.topology;
         let range = places(topology, first, end);
+        let range = range.start..range.end.min(run.vertices);
         let place = |place: u32| u64::from(draw.first) + u64::from(run.start) + u64::from(place);
         let pivot = uses_pivot(topology);
         let (elements, first_vertex) = (self.slots.len(), self.vertices.len());
@@ -179,6 +185,7 @@ impl VertexReuse {
             first,
             end,
             primitives_before: run.primitives_before,
+            run_primitives: run.primitives,
             base: range.start,
             elements,
             first_vertex,

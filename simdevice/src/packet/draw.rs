@@ -126,6 +126,8 @@ pub struct Draw {
     pub attributes: Vec<AttributeStream>,
     /// The bindings of the vertex program.
     pub vertex_bindings: Bindings,
+    /// The bindings of the tessellation and geometry programs.
+    pub primitive_bindings: PrimitiveBindings,
     /// The bindings of the fragment program.
     pub fragment_bindings: Bindings,
     /// The index buffer; without one vertices are consecutive.
@@ -140,6 +142,17 @@ pub struct Draw {
     pub instance_count: u32,
     /// The draw's number within an indirect command.
     pub draw_index: u32,
+}
+
+/// The bindings of the programs between the vertex and the fragment program.
+#[derive(Clone, Debug, Default)]
+pub struct PrimitiveBindings {
+    /// Those of the tessellation control program.
+    pub control: Bindings,
+    /// Those of the tessellation evaluation program.
+    pub evaluation: Bindings,
+    /// Those of the geometry program.
+    pub geometry: Bindings,
 }
 
 /// A dispatch: see [`Packet::Dispatch`](crate::Packet::Dispatch).

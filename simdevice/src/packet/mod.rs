@@ -11,7 +11,7 @@ pub use command::Packet;
 pub use devmem::BufferRange;
 pub use draw::{
     Activations, AttributeStream, Dispatch, Draw, GaussianAppend, GaussianAttributes,
-    GaussianBegin, GaussianFragmentStage, IndexStream, ModelAttributes,
+    GaussianBegin, GaussianFragmentStage, IndexStream, ModelAttributes, PrimitiveBindings,
 };
 pub use rendering::{Attachment, AttachmentClear, ClearAttachments, LoadOp, Rendering, StoreOp};
 pub use transfer::{

@@ -1,5 +1,6 @@
 //! The interfaces of programs: the meanings of the slots of their inputs and outputs.
 
+use crate::tessellation::Tessellation;
 use isa::ir::Program;
 
 /// The varyings of a vertex program that projects Gaussians, by number. The position that it writes is the Gaussian's
@@ -52,8 +53,107 @@ pub struct DrawPrograms {
     pub vertex_outputs: Vec<Option<VertexOutput>>,
     /// The number of varyings, each a 32-bit scalar.
     pub varyings: u32,
+    /// The tessellation stages.
+    pub tessellation: Option<TessellationPrograms>,
+    /// The geometry stage.
+    pub geometry: Option<GeometryPrograms>,
     /// The fragment stage. Without one only depth and stencil are written.
     pub fragment: Option<FragmentPrograms>,
+}
+
+/// A program that takes vertices of primitives or patches from the stage before. The outputs of a vertex program that
+/// such a program takes are its varyings.
+#[derive(Debug)]
+pub struct PrimitiveProgram {
+    /// The program. The vertices that it takes are preloaded.
+    pub program: Program,
+    /// The meanings of its inputs, by slot.
+    pub inputs: Vec<Option<PrimitiveInput>>,
+    /// The vertices that it takes. Their values are numbered as the stage before gives them.
+    pub takes: VertexMemory,
+    /// The number of primitives or patches of a batch.
+    pub groups: u32,
+    /// The lanes of a batch.
+    pub lanes: u32,
+}
+
+/// The values of vertices in a batch's workgroup memory.
+#[derive(Clone, Debug, Default)]
+pub struct VertexMemory {
+    /// The first byte.
+    pub start: u32,
+    /// The bytes of each primitive or patch.
+    pub stride: u32,
+    /// The values that are exchanged.
+    pub values: Vec<VertexValue>,
+}
+
+/// A 32-bit value of each vertex, or of a patch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct VertexValue {
+    /// The number of the value among those that the stage before gives.
+    pub number: u32,
+    /// The first byte, within a primitive or patch, of the first vertex.
+    pub offset: u32,
+    /// The bytes from one vertex to the next; `None` for a value of the patch.
+    pub vertex_stride: Option<u32>,
+}
+
+/// The tessellation stages of [`DrawPrograms`].
+#[derive(Debug)]
+pub struct TessellationPrograms {
+    /// The control program: a lane for each vertex of an output patch.
+    pub control: PrimitiveProgram,
+    /// The vertices and the patch that it gives.
+    pub gives: VertexMemory,
+    /// The first byte, within a patch, of each outer level; `None` is 0.
+    pub outer_levels: [Option<u32>; 4],
+    /// The first byte, within a patch, of each inner level; `None` is 0.
+    pub inner_levels: [Option<u32>; 2],
+    /// The number of vertices of an output patch.
+    pub output_vertices: u32,
+    /// The evaluation program: a lane for each vertex into which patches are divided.
+    pub evaluation: PrimitiveProgram,
+    /// The meanings of its outputs, by slot; `None` is not used.
+    pub outputs: Vec<Option<VertexOutput>>,
+    /// The way in which patches are divided.
+    pub tessellation: Tessellation,
+}
+
+/// The geometry stage of [`DrawPrograms`].
+#[derive(Debug)]
+pub struct GeometryPrograms {
+    /// The program: a lane for each invocation of each primitive.
+    pub program: PrimitiveProgram,
+    /// The number of invocations for each primitive.
+    pub invocations: u32,
+    /// The slot of the output that counts a lane's vertices.
+    pub count: u32,
+    /// The vertices that it gives. Each begins with a word that is 1 if the vertex is the first of a strip.
+    pub gives: VertexMemory,
+    /// The meanings of the values that it gives; `None` is not used.
+    pub outputs: Vec<Option<VertexOutput>>,
+    /// The number of corners of the primitives that it takes, with adjacent vertices: 1 to 6.
+    pub taken_corners: usize,
+    /// The number of corners of the primitives that it gives: 1 to 3.
+    pub corners: usize,
+}
+
+/// The value that the device gives to an input of a tessellation or geometry program.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum PrimitiveInput {
+    /// The primitive's or patch's number within the draw's instance.
+    PrimitiveId,
+    /// The number of a geometry program's invocation.
+    InvocationId,
+    /// The number of vertices of a patch.
+    PatchVertices,
+    /// The number in the batch of the patch.
+    Patch,
+    /// A coordinate of the vertex within the patch's domain: 0 to 2.
+    TessCoord(usize),
+    /// The layer of the view that is drawn; 0 without views.
+    ViewIndex,
 }
 
 /// The fragment stage of [`DrawPrograms`].
@@ -115,6 +215,8 @@ pub enum VertexOutput {
     Layer,
     /// The index of the viewport.
     ViewportIndex,
+    /// The primitive's number; geometry programs only.
+    PrimitiveId,
     /// A varying.
     Varying(u32),
 }

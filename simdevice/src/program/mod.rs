@@ -1,11 +1,12 @@
 //! Programs that are compiled for the device, and their bindings.
 //!
 //! [`interface`] defines the meanings of a program's slots, and [`bindings`] the memory that it uses. [`vertex`],
-//! [`fragment`] and [`compute`] hold the executables and the machines that run them.
+//! [`primitive`], [`fragment`] and [`compute`] hold the executables and the machines that run them.
 
 pub mod bindings;
 pub mod compute;
 pub mod fragment;
 pub mod interface;
 pub(crate) mod pool;
+pub(crate) mod primitive;
 pub mod vertex;

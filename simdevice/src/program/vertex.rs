@@ -1,11 +1,12 @@
-//! Vertex programs that are compiled for draws, alone or with a fragment program.
+//! Vertex programs that are compiled for draws, alone or with the programs of later stages.
 
 use super::pool::MachinePool;
 use crate::limits::{DRAW_SUBGROUP_SIZE, MAX_CLIP_CULL_DISTANCES};
 use crate::program::fragment::FragmentStage;
 use crate::program::interface::{
-    DrawPrograms, FragmentInput, Interpolation, VertexInput, VertexOutput,
+    DrawPrograms, FragmentInput, Interpolation, PrimitiveProgram, VertexInput, VertexOutput,
 };
+use crate::program::primitive::{GeometryStage, TessellationStage};
 use fearless_simd::Level;
 use isa::Options;
 use isa::ir::{Rate, Type};
@@ -15,10 +16,14 @@ use isa::validate::InvalidProgram;
 /// The number of vertices in a batch.
 pub(crate) const VERTEX_BATCH: usize = 128;
 
-/// A vertex and a fragment program that are compiled for one device.
+/// The programs of a draw's stages, compiled for one device.
 #[derive(Debug)]
 pub struct DrawPipeline {
     pub(crate) vertex: VertexProgram,
+    /// The tessellation programs.
+    pub(crate) tessellation: Option<TessellationStage>,
+    /// The geometry program.
+    pub(crate) geometry: Option<GeometryStage>,
     /// The fragment program.
     pub(crate) fragment: Option<FragmentStage>,
 }
@@ -40,6 +45,7 @@ pub(crate) struct VertexOutputs {
     pub cull: [Option<u32>; MAX_CLIP_CULL_DISTANCES],
     pub layer: Option<u32>,
     pub viewport: Option<u32>,
+    pub primitive_id: Option<u32>,
     /// The slots, by number of the varying. Only varyings that a fragment stage may read are included.
     pub varyings: Vec<Option<u32>>,
     /// The interpolation, by number of the varying.
@@ -54,12 +60,40 @@ impl DrawPipeline {
     pub fn new(level: Level, programs: &DrawPrograms) -> Result<Self, InvalidProgram> {
         // Without a fragment stage, varyings are not read.
         let varyings = programs.fragment.as_ref().map_or(0, |_| programs.varyings);
-        let vertex = VertexProgram::new(level, programs, varyings)?;
+        let control = programs.tessellation.as_ref().map(|it| &it.control);
+        let geometry = programs.geometry.as_ref().map(|it| &it.program);
+        // The stage after a stage reads its varyings.
+        let given = |next: Option<&PrimitiveProgram>| next.map_or(varyings, values_taken);
+        let vertex = VertexProgram::new(level, programs, given(control.or(geometry)))?;
+        let tessellation = programs.tessellation.as_ref().map(|it| {
+            let slots = it.evaluation.program.outputs.iter().map(|it| it.slot);
+            let outputs = VertexOutputs::new(slots, &it.outputs, given(geometry), programs);
+            TessellationStage::new(level, it, outputs)
+        });
+        let geometry = programs.geometry.as_ref().map(|it| {
+            let numbers = 0..it.outputs.len() as u32;
+            let outputs = VertexOutputs::new(numbers, &it.outputs, varyings, programs);
+            GeometryStage::new(level, it, outputs)
+        });
         let fragment = programs.fragment.as_ref();
         let fragment = fragment
             .map(|fragment| FragmentStage::new(level, fragment))
             .transpose()?;
-        Ok(Self { vertex, fragment })
+        Ok(Self {
+            vertex,
+            tessellation: tessellation.transpose()?,
+            geometry: geometry.transpose()?,
+            fragment,
+        })
+    }
+
+    /// The outputs of the last stage before rasterization.
+    pub(crate) fn last_outputs(&self) -> &VertexOutputs {
+        match (&self.geometry, &self.tessellation) {
+            (Some(geometry), _) => &geometry.outputs,
+            (None, Some(tessellation)) => &tessellation.outputs,
+            (None, None) => &self.vertex.outputs,
+        }
     }
 
     /// Compiles a vertex program that projects Gaussians; see [`gaussian`](crate::program::interface::gaussian).
@@ -69,6 +103,8 @@ impl DrawPipeline {
     pub fn of_gaussians(level: Level, programs: &DrawPrograms) -> Result<Self, InvalidProgram> {
         Ok(Self {
             vertex: VertexProgram::new(level, programs, programs.varyings)?,
+            tessellation: None,
+            geometry: None,
             fragment: None,
         })
     }
@@ -97,17 +133,34 @@ impl VertexProgram {
             .collect();
         Ok(Self {
             inputs,
-            outputs: VertexOutputs::new(programs, varyings as usize),
+            outputs: VertexOutputs::new(
+                programs.vertex.outputs.iter().map(|output| output.slot),
+                &programs.vertex_outputs,
+                varyings,
+                programs,
+            ),
             machines: MachinePool::new(executable),
         })
     }
 }
 
+/// The number of values that a program takes from the stage before it.
+fn values_taken(program: &PrimitiveProgram) -> u32 {
+    let numbers = program.takes.values.iter().map(|value| value.number + 1);
+    numbers.max().unwrap_or(0)
+}
+
 impl VertexOutputs {
-    fn new(programs: &DrawPrograms, varyings: usize) -> Self {
+    /// The outputs in some slots, with their meanings by slot. `varyings` is the number of varyings.
+    fn new(
+        slots: impl Iterator<Item = u32>,
+        meanings: &[Option<VertexOutput>],
+        varyings: u32,
+        programs: &DrawPrograms,
+    ) -> Self {
         let mut this = Self {
-            varyings: vec![None; varyings],
-            interpolation: vec![Interpolation::Flat; varyings],
+            varyings: vec![None; varyings as usize],
+            interpolation: vec![Interpolation::Flat; varyings as usize],
             ..Self::default()
         };
         let fragment_inputs = programs.fragment.iter().flat_map(|stage| &stage.inputs);
@@ -122,8 +175,8 @@ impl VertexOutputs {
                 *entry = interpolation;
             }
         }
-        for output in programs.vertex.outputs.iter().map(|output| output.slot) {
-            let Some(meaning) = programs.vertex_outputs.get(output as usize) else {
+        for output in slots {
+            let Some(meaning) = meanings.get(output as usize) else {
                 continue;
             };
             let entry = match *meaning {
@@ -133,6 +186,7 @@ impl VertexOutputs {
                 Some(VertexOutput::CullDistance(index)) => this.cull.get_mut(index),
                 Some(VertexOutput::Layer) => Some(&mut this.layer),
                 Some(VertexOutput::ViewportIndex) => Some(&mut this.viewport),
+                Some(VertexOutput::PrimitiveId) => Some(&mut this.primitive_id),
                 Some(VertexOutput::Varying(index)) => this.varyings.get_mut(index as usize),
                 None => None,
             };
@@ -147,6 +201,7 @@ impl VertexOutputs {
     pub(crate) fn has_optional(&self, points: bool) -> bool {
         points && self.point_size.is_some()
             || self.layer.is_some()
+            || self.primitive_id.is_some()
             || self.viewport.is_some()
             || self.has_distances()
     }

@@ -139,6 +139,10 @@ pub enum Topology {
     LineStripWithAdjacency,
     TriangleListWithAdjacency,
     TriangleStripWithAdjacency,
+    PatchList {
+        /// The number of vertices of a patch.
+        control_points: u32,
+    },
 }
 
 /// The part of a polygon that is drawn.
@@ -301,6 +305,8 @@ pub struct DrawState {
     pub line_width: f32,
     /// True if the provoking vertex is the last; else it is the first.
     pub provoking_last: bool,
+    /// True if the origin of the domain of patches is the lower left, which exchanges the orders of vertices.
+    pub lower_left_domain: bool,
     /// The samples per pixel of the pass: 1 or 4.
     pub samples: u32,
     /// The mask of samples that may be covered.
@@ -354,6 +360,7 @@ impl DrawState {
             depth_bias: None,
             line_width: 1.0,
             provoking_last: false,
+            lower_left_domain: false,
             samples: 1,
             sample_mask: u32::MAX,
             sample_shading: false,

@@ -92,6 +92,10 @@ counters! {
     InputVertices: "geometry", "input vertices", Count, "Vertices or indices of draws of points, lines and triangles";
     InputPrimitives: "geometry", "input primitives", Count, "Points, lines and triangles that were assembled";
     VertexInvocations: "geometry", "vertex invocations", Count, "Vertices shaded";
+    TessellationPatches: "geometry", "tessellation patches", Count, "Patches that tessellation control programs shaded";
+    TessellationInvocations: "geometry", "tessellation evaluation invocations", Count, "Vertices that tessellation evaluation programs shaded";
+    GeometryInvocations: "geometry", "geometry invocations", Count, "Invocations of geometry programs";
+    GeometryPrimitives: "geometry", "geometry primitives", Count, "Primitives that geometry programs emitted";
     ClippingInvocations: "geometry", "clipping invocations", Count, "Primitives that reached clipping";
     ClippingPrimitives: "geometry", "clipping primitives", Count, "Primitives that clipping left, as it cut them";
     PrimitivesDrawn: "geometry", "primitives drawn", Count, "Primitives that were not culled and may cover a sample";

@@ -17,6 +17,7 @@ use super::structurize::{Case, Construct, Edge, Jump, MergePoint, Node, Tree};
 use super::translator::Translator;
 use super::value::{Pointer, Value};
 use super::variables;
+use super::vertex_memory;
 use crate::error::{Diagnostic, Error, Result, malformed, unsupported};
 use crate::instruction::Instruction;
 use crate::module::Block;
@@ -82,6 +83,7 @@ impl<'a> ControlFlow<'a> {
     pub fn run(&mut self, function: usize) -> Result<(), Error> {
         let definition = &self.t.module.sections.functions[function].definition;
         let locate = |diagnostic: Diagnostic| diagnostic.locate(definition.reference());
+        vertex_memory::allocate(&mut self.t).map_err(locate)?;
         variables::global_variables(&mut self.t)?;
         if !self.t.module.sections.functions[function]
             .parameters

@@ -11,7 +11,8 @@ use super::emitter::Emitter;
 use crate::error::{Result, malformed, unsupported};
 use crate::globals::Globals;
 use crate::interface::{
-    BuiltIn, Input, InputSource, Interpolation, Output, OutputTarget, Sampling, ScalarType, Stage,
+    BuiltIn, Input, InputSource, Interface, Interpolation, Output, OutputTarget, Sampling,
+    ScalarType, Stage,
 };
 use crate::module::Module;
 use crate::types::{Member, Scalar, Type as SpirvType};
@@ -56,6 +57,8 @@ pub struct InputsOutputs<'a> {
     pub stage: Stage,
     pub workgroup_size: [u32; 3],
     pub subgroup_size: u32,
+    /// Tessellation control: the number of vertices of an output patch.
+    pub output_vertices: u32,
     pub inputs: Vec<Input>,
     pub outputs: Vec<Output>,
     /// True if an input is read that differs between samples.
@@ -71,16 +74,16 @@ impl<'a> InputsOutputs<'a> {
     pub fn new(
         module: &'a Module,
         globals: &'a Globals,
-        stage: Stage,
-        workgroup_size: [u32; 3],
+        interface: &Interface,
         subgroup_size: u32,
     ) -> Self {
         Self {
             module,
             globals,
-            stage,
-            workgroup_size,
+            stage: interface.stage,
+            workgroup_size: interface.workgroup_size,
             subgroup_size,
+            output_vertices: interface.modes.output_vertices.unwrap_or(0),
             inputs: Vec::new(),
             outputs: Vec::new(),
             per_sample: false,
@@ -103,7 +106,13 @@ impl<'a> InputsOutputs<'a> {
         let Some(global) = self.globals.variables.get(&variable) else {
             return malformed(format!("%{variable} isn't an input or output"));
         };
-        let scalars = self.globals.types.scalars(global.pointee)?;
+        self.locations_as(variable, global.pointee)
+    }
+
+    /// The location of each scalar of an input or output variable, taken as of type `ty`: that of one vertex, if the
+    /// variable is an array of vertices' values.
+    pub fn locations_as(&self, variable: u32, ty: u32) -> Result<Rc<[IoLocation]>> {
+        let scalars = self.globals.types.scalars(ty)?;
         if let Some(built_in) = self.module.built_in(variable) {
             if scalars > MAX_BUILT_IN_SCALARS {
                 return unsupported("a built-in of this many elements");
@@ -124,7 +133,7 @@ impl<'a> InputsOutputs<'a> {
             index: number(Decoration::Index).unwrap_or(0),
         };
         let mut locations = Vec::with_capacity(scalars as usize);
-        self.place(global.pointee, &mut cursor, &mut locations)?;
+        self.place(ty, &mut cursor, &mut locations)?;
         Ok(locations.into())
     }
 
@@ -254,6 +263,7 @@ impl<'a> InputsOutputs<'a> {
             | BuiltIn::BaseInstance
             | BuiltIn::DrawIndex
             | BuiltIn::ViewIndex
+            | BuiltIn::PatchVertices
             | BuiltIn::WorkgroupId
             | BuiltIn::NumWorkgroups => Rate::Uniform,
             _ => Rate::Varying,
@@ -340,6 +350,9 @@ impl<'a> InputsOutputs<'a> {
             Spirv::Layer => BuiltIn::Layer,
             Spirv::ViewportIndex => BuiltIn::ViewportIndex,
             Spirv::PrimitiveId => BuiltIn::PrimitiveId,
+            Spirv::InvocationId if self.stage == Stage::Geometry => BuiltIn::InvocationId,
+            Spirv::PatchVertices => BuiltIn::PatchVertices,
+            Spirv::TessCoord => BuiltIn::TessCoord,
             Spirv::FragCoord => BuiltIn::FragCoord,
             Spirv::PointCoord => BuiltIn::PointCoord,
             Spirv::FrontFacing => BuiltIn::FrontFacing,
@@ -372,6 +385,11 @@ impl<'a> InputsOutputs<'a> {
         let axis = component.min(2) as usize;
         Ok(match built_in {
             Spirv::LocalInvocationIndex => emit.builder.lane_index(),
+            // A patch has a lane for each output vertex.
+            Spirv::InvocationId if self.stage == Stage::TessellationControl => {
+                let lane = emit.builder.lane_index();
+                emit.divided(lane, self.output_vertices.max(1)).1
+            }
             Spirv::LocalInvocationId => self.local_id(emit, axis),
             Spirv::GlobalInvocationId => {
                 let local = self.local_id(emit, axis);
@@ -487,7 +505,8 @@ impl<'a> InputsOutputs<'a> {
     }
 }
 
-fn output_target(location: IoLocation) -> Result<OutputTarget> {
+/// The target of an output's scalar.
+pub fn output_target(location: IoLocation) -> Result<OutputTarget> {
     Ok(match location {
         IoLocation::Location {
             location,
@@ -510,6 +529,9 @@ fn output_target(location: IoLocation) -> Result<OutputTarget> {
                 Spirv::CullDistance => BuiltIn::CullDistance,
                 Spirv::Layer => BuiltIn::Layer,
                 Spirv::ViewportIndex => BuiltIn::ViewportIndex,
+                Spirv::PrimitiveId => BuiltIn::PrimitiveId,
+                Spirv::TessLevelOuter => BuiltIn::TessLevelOuter,
+                Spirv::TessLevelInner => BuiltIn::TessLevelInner,
                 Spirv::FragDepth => BuiltIn::FragDepth,
                 Spirv::SampleMask => BuiltIn::SampleMask,
                 other => return unsupported(format!("output built-in {other:?}")),
@@ -525,6 +547,7 @@ pub fn is_computed(built_in: Spirv) -> bool {
     matches!(
         built_in,
         LocalInvocationIndex
+            | InvocationId
             | LocalInvocationId
             | GlobalInvocationId
             | HelperInvocation

@@ -31,6 +31,7 @@ mod subgroup;
 mod translator;
 mod value;
 mod variables;
+mod vertex_memory;
 
 use std::collections::HashMap;
 
@@ -42,7 +43,10 @@ use spirv::{
 use crate::error::{Diagnostic, Error, Result, malformed, unsupported};
 use crate::globals::{Globals, Specialization};
 use crate::instruction::Instruction;
-use crate::interface::{DepthMode, Interface, Shader, Stage};
+use crate::interface::{
+    DepthMode, Domain, InputPrimitive, Interface, OutputPrimitive, PrimitiveModes, Shader, Spacing,
+    Stage, VertexExchange,
+};
 use crate::module::Module;
 use analysis::Analysis;
 use control_flow::ControlFlow;
@@ -50,6 +54,7 @@ use emitter::Emitter;
 use inputs_outputs::InputsOutputs;
 use promoted::PromotedVariables;
 use translator::Translator;
+use vertex_memory::VertexPlaces;
 
 pub use options::Options;
 
@@ -117,23 +122,18 @@ fn translate_here(
         analysis: &analysis,
         options: *options,
         emit: Emitter::new(),
-        io: InputsOutputs::new(
-            module,
-            &globals,
-            stage,
-            interface.workgroup_size,
-            options.subgroup_size,
-        ),
+        io: InputsOutputs::new(module, &globals, &interface, options.subgroup_size),
         promoted: PromotedVariables::default(),
         interface,
         next_resource_slot: 0,
         workgroup_block: None,
+        vertex_memory: VertexPlaces::default(),
         values: HashMap::new(),
         types: HashMap::new(),
     };
     let mut control_flow = ControlFlow::new(translator);
     control_flow.run(function)?;
-    finish(control_flow.t, &named)
+    finish(control_flow.t, declaration, &named)
 }
 
 /// The interface of an entry point with its execution modes, still without inputs and outputs.
@@ -205,14 +205,52 @@ fn execution_mode(globals: &Globals, it: &Instruction, interface: &mut Interface
         ExecutionMode::OriginLowerLeft => {
             return unsupported("an origin at the lower left");
         }
+        _ => return primitive_mode(it, mode, interface.stage, &mut interface.modes),
+    }
+    Ok(())
+}
+
+/// An execution mode of tessellation and geometry stages.
+fn primitive_mode(
+    it: &Instruction,
+    mode: ExecutionMode,
+    stage: Stage,
+    modes: &mut PrimitiveModes,
+) -> Result<()> {
+    match mode {
+        ExecutionMode::Triangles if stage == Stage::Geometry => {
+            modes.input = Some(InputPrimitive::Triangles);
+        }
+        ExecutionMode::Triangles => modes.domain = Some(Domain::Triangles),
+        ExecutionMode::Quads => modes.domain = Some(Domain::Quads),
+        ExecutionMode::Isolines => modes.domain = Some(Domain::Isolines),
+        ExecutionMode::SpacingEqual => modes.spacing = Some(Spacing::Equal),
+        ExecutionMode::SpacingFractionalEven => modes.spacing = Some(Spacing::FractionalEven),
+        ExecutionMode::SpacingFractionalOdd => modes.spacing = Some(Spacing::FractionalOdd),
+        ExecutionMode::VertexOrderCw => modes.clockwise = Some(true),
+        ExecutionMode::VertexOrderCcw => modes.clockwise = Some(false),
+        ExecutionMode::PointMode => modes.point_mode = true,
+        ExecutionMode::OutputVertices => modes.output_vertices = Some(it.number(2)?),
+        ExecutionMode::Invocations => modes.invocations = Some(it.number(2)?),
+        ExecutionMode::InputPoints => modes.input = Some(InputPrimitive::Points),
+        ExecutionMode::InputLines => modes.input = Some(InputPrimitive::Lines),
+        ExecutionMode::InputLinesAdjacency => modes.input = Some(InputPrimitive::LinesAdjacency),
+        ExecutionMode::InputTrianglesAdjacency => {
+            modes.input = Some(InputPrimitive::TrianglesAdjacency);
+        }
+        ExecutionMode::OutputPoints => modes.output = Some(OutputPrimitive::Points),
+        ExecutionMode::OutputLineStrip => modes.output = Some(OutputPrimitive::LineStrip),
+        ExecutionMode::OutputTriangleStrip => modes.output = Some(OutputPrimitive::TriangleStrip),
         _ => {}
     }
     Ok(())
 }
 
 /// The translated shader of an entry point whose declaration names these variables.
-fn finish(mut t: Translator, named: &[u32]) -> Result<Shader, Error> {
+fn finish(mut t: Translator, declaration: &Instruction, named: &[u32]) -> Result<Shader, Error> {
     variables::declare_push_constants(&mut t);
+    vertex_memory::describe(&mut t)
+        .map_err(|diagnostic| diagnostic.locate(declaration.reference()))?;
     t.interface.per_sample = t.io.per_sample || variables::has_an_input_of_samples(&t, named);
     t.interface.inputs = t.io.inputs;
     t.interface.outputs = t.io.outputs;
@@ -234,6 +272,8 @@ fn empty_interface(stage: Stage) -> Interface {
         depth: DepthMode::NotWritten,
         discards: false,
         per_sample: false,
+        modes: PrimitiveModes::default(),
+        exchange: VertexExchange::default(),
         has_side_effects: false,
         uses_addresses: false,
     }
@@ -250,6 +290,9 @@ fn no_entry(name: &str, stage: Stage) -> Error {
 fn find_entry<'a>(module: &'a Module, name: &str, stage: Stage) -> Result<&'a Instruction, Error> {
     let model = match stage {
         Stage::Vertex => ExecutionModel::Vertex,
+        Stage::TessellationControl => ExecutionModel::TessellationControl,
+        Stage::TessellationEvaluation => ExecutionModel::TessellationEvaluation,
+        Stage::Geometry => ExecutionModel::Geometry,
         Stage::Fragment => ExecutionModel::Fragment,
         Stage::Compute => ExecutionModel::GLCompute,
     };
@@ -295,6 +338,10 @@ pub fn is_supported(capability: Capability) -> bool {
         capability,
         C::Matrix
             | C::Shader
+            | C::Geometry
+            | C::GeometryPointSize
+            | C::Tessellation
+            | C::TessellationPointSize
             | C::Float16
             | C::Float64
             | C::Int64

@@ -13,6 +13,7 @@ use super::inputs_outputs::InputsOutputs;
 use super::options::Options;
 use super::promoted::PromotedVariables;
 use super::value::{EXPLICIT, MemoryLayout, MemoryRef, Pointer, TIGHT, Value};
+use super::vertex_memory::VertexPlaces;
 use crate::error::{Result, malformed, unsupported};
 use crate::globals::Globals;
 use crate::instruction::Instruction;
@@ -33,6 +34,8 @@ pub struct Translator<'a> {
     pub next_resource_slot: u32,
     /// The place of the blocks in workgroup memory, once allocated.
     pub workgroup_block: Option<u32>,
+    /// The places of vertices' values in workgroup memory.
+    pub vertex_memory: VertexPlaces,
     pub values: HashMap<u32, Value>,
     /// Types of the ids in `values`.
     pub types: HashMap<u32, u32>,

@@ -11,6 +11,7 @@ use super::value::{EXPLICIT, MemoryRef, Pointer, TIGHT, Value};
 use crate::error::{Diagnostic, Error, Result, malformed, unsupported};
 use crate::globals::GlobalVariable;
 use crate::instruction::Instruction;
+use crate::interface::Stage;
 use crate::types::Type;
 
 /// Reports whether variables of a storage class may be held in registers.
@@ -59,6 +60,11 @@ fn global_variable(t: &mut Translator, id: u32) -> Result<Value> {
     let pointer = match class {
         StorageClass::Private if t.analysis.in_memory.contains(&id) => {
             private_variable(t, id, pointee)?
+        }
+        StorageClass::Input | StorageClass::Output
+            if let Some(place) = t.vertex_memory.place(id) =>
+        {
+            Pointer::Memory(place)
         }
         _ if is_in_registers(class) => {
             let input = (class == StorageClass::Input).then_some(id);
@@ -227,6 +233,9 @@ pub fn has_an_input_of_samples(t: &Translator, interface: &[u32]) -> bool {
 
 /// Assigns the stored values to the output variables.
 pub fn assign_outputs(t: &mut Translator) -> Result<()> {
+    if t.interface.stage == Stage::Geometry {
+        return Ok(());
+    }
     let mut outputs: Vec<u32> = t.analysis.used.iter().copied().collect();
     outputs.retain(|id| {
         let class = t.globals.variables.get(id).map(|it| it.class);

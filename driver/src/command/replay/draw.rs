@@ -12,7 +12,7 @@ use crate::pipeline::state::AttributeSource;
 use ash::vk;
 use gaurast_spirv::ScalarType;
 use simdevice::Packet;
-use simdevice::packet::{AttributeStream, BufferRange, IndexStream};
+use simdevice::packet::{AttributeStream, BufferRange, IndexStream, PrimitiveBindings};
 use simdevice::state::DrawState;
 use simdevice::state::gaussian::CameraModel;
 use std::sync::Arc;
@@ -203,6 +203,11 @@ pub(super) fn primitives(
         pipeline: Arc::clone(&primitives.programs),
         attributes: attributes.collect::<Result<_, _>>()?,
         vertex_bindings: bindings(&primitives.vertex_resources)?,
+        primitive_bindings: PrimitiveBindings {
+            control: bindings(&primitives.control_resources)?,
+            evaluation: bindings(&primitives.evaluation_resources)?,
+            geometry: bindings(&primitives.geometry_resources)?,
+        },
         fragment_bindings: bindings(&primitives.fragment_resources)?,
         indices: indices(state, parameters)?,
         first: parameters.first,

@@ -14,7 +14,7 @@ use crate::pipeline::state::AttributeSource;
 use simdevice::Packet;
 use simdevice::packet::{
     AttributeStream, BufferRange, GaussianAppend, GaussianAttributes, GaussianBegin,
-    GaussianFragmentStage, ModelAttributes,
+    GaussianFragmentStage, ModelAttributes, PrimitiveBindings,
 };
 use simdevice::program::bindings::Bindings;
 use simdevice::state::gaussian::{
@@ -127,6 +127,7 @@ fn shaded(
             pipeline: Arc::clone(&projection.programs),
             attributes: attributes.collect::<Result<_, _>>()?,
             vertex_bindings: bindings,
+            primitive_bindings: PrimitiveBindings::default(),
             fragment_bindings: Bindings::default(),
             indices: indices(state, parameters)?,
             first: parameters.first,

@@ -174,6 +174,11 @@ impl Builder {
         allocate(&mut self.program.shared_bytes, bytes, align)
     }
 
+    /// Makes all workgroup memory that is reserved until now such that the caller sets it before each batch.
+    pub fn preload_shared(&mut self) {
+        self.program.preloaded_bytes = self.program.shared_bytes;
+    }
+
     /// Reserves private memory of each lane and returns its byte offset, a multiple of 4. 64-bit elements need no more.
     pub fn allocate_private(&mut self, bytes: u32) -> u32 {
         allocate(

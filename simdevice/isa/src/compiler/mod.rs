@@ -83,6 +83,8 @@ pub struct CompiledProgram {
     pub subgroup_size: usize,
     /// Bytes of workgroup memory.
     pub shared_bytes: u32,
+    /// The first bytes of workgroup memory that the caller sets.
+    pub preloaded_bytes: u32,
     /// Bytes of private memory of each lane.
     pub private_bytes: u32,
     /// The contents of private memory, if they are the same in all lanes at all times.
@@ -140,6 +142,7 @@ impl CompiledProgram {
             inputs: program.inputs,
             outputs: program.outputs,
             shared_bytes: program.shared_bytes,
+            preloaded_bytes: program.preloaded_bytes,
             private_bytes: program.private_bytes,
             table: table.map(|words| words.into_iter().map(AtomicU32::new).collect()),
             lanes,

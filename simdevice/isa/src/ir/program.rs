@@ -66,8 +66,11 @@ pub struct Program {
     pub inputs: Vec<Input>,
     /// Variables that the caller reads.
     pub outputs: Vec<Output>,
-    /// Bytes of workgroup memory, at most [`MAX_MEMORY_BYTES`]. It is zero when a batch begins.
+    /// Bytes of workgroup memory, at most [`MAX_MEMORY_BYTES`].
     pub shared_bytes: u32,
+    /// The first bytes of workgroup memory that the caller sets before each batch, a multiple of 4. The others are zero
+    /// when a batch begins.
+    pub preloaded_bytes: u32,
     /// Bytes of private memory of each lane, a multiple of 4, at most [`MAX_MEMORY_BYTES`]. Its contents are undefined
     /// when a batch begins.
     pub private_bytes: u32,

@@ -58,6 +58,10 @@ pub fn validate(program: &Program) -> Result<(), InvalidProgram> {
     if !program.private_bytes.is_multiple_of(4) {
         return structure("private memory isn't a whole number of words");
     }
+    if !program.preloaded_bytes.is_multiple_of(4) || program.preloaded_bytes > program.shared_bytes
+    {
+        return structure("the preloaded bytes aren't whole words of workgroup memory");
+    }
     let mut checker = Checker {
         program,
         defined: program

@@ -192,6 +192,19 @@ impl Machine {
         })
     }
 
+    /// A word of workgroup memory, by its number; zero beyond the end.
+    pub fn workgroup_word(&self, word: usize) -> u32 {
+        self.shared.get(word).map_or(0, |word| word.load(Relaxed))
+    }
+
+    /// Sets a word of workgroup memory, by its number. A batch keeps only those that are preloaded:
+    /// [`Program::preloaded_bytes`](crate::ir::Program::preloaded_bytes).
+    pub fn set_workgroup_word(&mut self, word: usize, bits: u32) {
+        if let Some(word) = self.shared.get_mut(word) {
+            *word.get_mut() = bits;
+        }
+    }
+
     /// The lanes that the last batch killed or demoted.
     pub fn killed(&mut self) -> LaneMask {
         let width = self.executable.program.lanes.div_ceil(64);
@@ -268,6 +281,8 @@ impl Machine {
             let range = self.vectors_of(self.executable.program.cleared[index]);
             self.registers[range].fill(Vector::default());
         }
-        self.shared.iter().for_each(|word| word.store(0, Relaxed));
+        let preloaded = self.executable.program.preloaded_bytes / 4;
+        let cleared = self.shared.iter().skip(preloaded as usize);
+        cleared.for_each(|word| word.store(0, Relaxed));
     }
 }

@@ -183,6 +183,7 @@ pub fn draw_with(
             stream(&values, Format::R32Sfloat),
         ],
         vertex_bindings: Bindings::default(),
+        primitive_bindings: PrimitiveBindings::default(),
         fragment_bindings: Bindings::default(),
         indices: None,
         first: 0,

@@ -1,0 +1,83 @@
+//! Set-up and binning of a worker's primitives, piece by piece.
+
+use super::bins::Bins;
+use super::draw::PrimitiveSegment;
+use super::order;
+use super::primitive::Varyings;
+use super::primitive_list::ListedPrimitive;
+use super::setup::{Output, SegmentSetup, Setup};
+use super::shade::Shaded;
+use crate::stats::counters::{Counter, Counters};
+use devmem::host;
+use std::time::Instant;
+
+/// The primitives that a worker has set up, in pieces of segments.
+pub(super) struct Pieces<'a> {
+    setup: &'a Setup<'a>,
+    /// True if nothing is rasterized.
+    pub discards: bool,
+    numbers: Vec<u32>,
+    output: Output,
+    pub counters: Counters,
+    /// The pieces that have primitives, with the numbers of their segments and of the pieces in these.
+    pub segments: Vec<((u64, u32), PrimitiveSegment)>,
+}
+
+impl<'a> Pieces<'a> {
+    pub(super) fn new(setup: &'a Setup<'a>) -> Self {
+        Self {
+            setup,
+            discards: setup.state.rasterizer_discard || setup.transforms.is_empty(),
+            numbers: Vec::new(),
+            output: Output::default(),
+            counters: Counters::default(),
+            segments: Vec::new(),
+        }
+    }
+
+    /// Begins to set up the primitives of these vertices.
+    pub(super) fn begin<'s>(&'s mut self, shaded: &'s Shaded) -> SegmentSetup<'s> {
+        self.output.clear();
+        SegmentSetup::new(self.setup, shaded, &mut self.numbers, &mut self.output)
+    }
+
+    /// Sets up primitives that programs made.
+    pub(super) fn set_up(
+        &mut self,
+        shaded: &Shaded,
+        primitives: &[ListedPrimitive],
+        place: (u64, u32),
+    ) {
+        if self.discards {
+            let count = primitives.len() as u64;
+            self.counters.add(Counter::ClippingInvocations, count);
+            return;
+        }
+        self.begin(shaded).run_list(primitives);
+        self.keep(place);
+    }
+
+    /// Keeps the primitives that were set up last, copied to memory of their size, with lists by macro-tile.
+    pub(super) fn keep(&mut self, place: (u64, u32)) {
+        let (output, setup, counters) = (&self.output, self.setup, &mut self.counters);
+        counters.add(Counter::ClippingInvocations, output.assembled);
+        counters.add(Counter::ClippingPrimitives, output.clipped);
+        counters.add(Counter::PrimitivesDrawn, output.primitives.len() as u64);
+        if output.primitives.is_empty() {
+            return;
+        }
+        let started = Instant::now();
+        let mut bins = Bins::new(&setup.grid, setup.layers, &output.pairs);
+        let per_vertex = setup.outputs.varyings.len();
+        let (primitives, values) = order::in_order(output, per_vertex, &mut bins, order::FEW);
+        counters.add(Counter::BinnedPairs, bins.pairs());
+        let elapsed = started.elapsed().as_nanos() as u64;
+        counters.add(Counter::BinningTime, elapsed);
+        let piece = PrimitiveSegment {
+            primitives,
+            varyings: Varyings { values, per_vertex },
+            bins,
+        };
+        host::push(&mut self.segments, (place, piece));
+    }
+}

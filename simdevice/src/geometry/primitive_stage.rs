@@ -1,0 +1,104 @@
+//! Runs a tessellation or geometry program on batches: its vertices and inputs.
+
+use crate::program::interface::PrimitiveInput;
+use crate::program::pool::PooledMachine;
+use crate::program::primitive::PrimitiveStage;
+use isa::machine::{LaneMask, Stopped, Watchdog};
+use isa::resources::Resources;
+
+/// What the programs of a draw share.
+#[derive(Clone, Copy)]
+pub(super) struct Environment<'a> {
+    pub watchdog: Watchdog<'a>,
+    /// The number of the view that is drawn.
+    pub view: u32,
+}
+
+/// A machine for the program of a stage.
+pub(super) struct StageRunner<'a> {
+    pub stage: &'a PrimitiveStage,
+    pub machine: PooledMachine<'a>,
+    resources: &'a Resources<'a>,
+    environment: Environment<'a>,
+}
+
+impl<'a> StageRunner<'a> {
+    pub(super) fn new(
+        stage: &'a PrimitiveStage,
+        resources: &'a Resources<'a>,
+        environment: Environment<'a>,
+    ) -> Self {
+        Self {
+            stage,
+            machine: stage.machines.lend(),
+            resources,
+            environment,
+        }
+    }
+
+    /// Sets the vertices of primitive or patch number `group` of the batch, and the values of the patch. Each vertex has
+    /// its values by number.
+    pub(super) fn take<'v>(
+        &mut self,
+        group: usize,
+        vertices: impl Iterator<Item = &'v [u32]>,
+        patch: &[u32],
+    ) {
+        let takes = &self.stage.takes;
+        let first = takes.start as usize + group * takes.stride as usize;
+        let of = |values: &[u32], number: u32| values.get(number as usize).copied().unwrap_or(0);
+        for (number, vertex) in vertices.enumerate() {
+            for value in &takes.values {
+                if let Some(stride) = value.vertex_stride {
+                    let byte = first + value.offset as usize + number * stride as usize;
+                    self.machine
+                        .set_workgroup_word(byte / 4, of(vertex, value.number));
+                }
+            }
+        }
+        let of_patch = takes
+            .values
+            .iter()
+            .filter(|value| value.vertex_stride.is_none());
+        for value in of_patch {
+            let byte = first + value.offset as usize;
+            self.machine
+                .set_workgroup_word(byte / 4, of(patch, value.number));
+        }
+    }
+
+    /// Runs the program in the first lanes. `input` gives the value of an input in a lane.
+    pub(super) fn run(
+        &mut self,
+        lanes: usize,
+        input: impl Fn(PrimitiveInput, usize) -> u32,
+    ) -> Result<(), Stopped> {
+        for &(slot, meaning) in &self.stage.inputs {
+            match meaning {
+                PrimitiveInput::ViewIndex => self.machine.fill_input(slot, self.environment.view),
+                PrimitiveInput::PatchVertices => self.machine.fill_input(slot, input(meaning, 0)),
+                _ => {
+                    let vectors = self.machine.input_mut(slot);
+                    for (lane, bits) in vectors.iter_mut().flat_map(|it| &mut it.0).enumerate() {
+                        *bits = if lane < lanes {
+                            input(meaning, lane)
+                        } else {
+                            0
+                        };
+                    }
+                }
+            }
+        }
+        self.machine.run(
+            &LaneMask::first(lanes),
+            &LaneMask::none(),
+            self.resources,
+            self.environment.watchdog,
+        )
+    }
+
+    /// A word that the program gave, by its first byte.
+    pub(super) fn given(&self, byte: u32) -> u32 {
+        self.machine.workgroup_word(byte as usize / 4)
+    }
+}

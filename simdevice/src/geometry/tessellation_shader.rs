@@ -1,0 +1,255 @@
+//! Tessellation programs: the control program shades patches, the tessellator divides them, and the evaluation program
+//! shades the vertices.
+
+use super::pieces::Pieces;
+use super::primitive_list::PrimitiveList;
+use super::primitive_stage::{Environment, StageRunner};
+use super::shade::{OutputReader, Shaded, Vertices};
+use crate::program::interface::PrimitiveInput;
+use crate::program::primitive::TessellationStage;
+use crate::stats::counters::Counter;
+use crate::tessellation::{TessellatedPatch, Tessellation};
+use devmem::host;
+use isa::machine::Stopped;
+use isa::resources::Resources;
+
+/// The number of vertices after which they go on to the next stage.
+const ENOUGH_VERTICES: usize = 8192;
+
+/// Runs the programs of tessellation.
+pub(super) struct TessellationShader<'a> {
+    stage: &'a TessellationStage,
+    control: StageRunner<'a>,
+    evaluation: StageRunner<'a>,
+    reader: OutputReader<'a>,
+    tessellation: Tessellation,
+    /// What the control program gave, patch by patch: the values of each vertex, then those of the patch.
+    patches: Vec<u32>,
+    divided: TessellatedPatch,
+    batch: Batch,
+    shaded: Shaded,
+    primitives: PrimitiveList,
+}
+
+/// The vertices that wait for the evaluation program.
+#[derive(Default)]
+struct Batch {
+    /// The coordinates of each vertex.
+    points: Vec<[f32; 3]>,
+    /// The number in the batch of each vertex's patch.
+    groups: Vec<u32>,
+    /// The numbers within the instance of the batch's patches.
+    ids: Vec<u32>,
+}
+
+/// The patches that the control program shaded last.
+struct Shape {
+    /// The number of values of each vertex and of each patch.
+    values: usize,
+    /// The number of rows of values of a patch.
+    rows: usize,
+}
+
+/// What takes the vertices and primitives of tessellation.
+pub(super) type Receiver<'r> =
+    dyn FnMut(&Shaded, &PrimitiveList, &mut Pieces<'_>) -> Result<(), Stopped> + 'r;
+
+impl<'a> TessellationShader<'a> {
+    pub(super) fn new(
+        stage: &'a TessellationStage,
+        reader: OutputReader<'a>,
+        tessellation: Tessellation,
+        [control, evaluation]: [&'a Resources<'a>; 2],
+        environment: Environment<'a>,
+    ) -> Self {
+        Self {
+            stage,
+            control: StageRunner::new(&stage.control, control, environment),
+            evaluation: StageRunner::new(&stage.evaluation, evaluation, environment),
+            reader,
+            tessellation,
+            patches: Vec::new(),
+            divided: TessellatedPatch::default(),
+            batch: Batch::default(),
+            shaded: Shaded::default(),
+            primitives: PrimitiveList::default(),
+        }
+    }
+
+    /// Runs the programs on patches. `receive` takes the vertices and primitives, in order.
+    pub(super) fn run(
+        &mut self,
+        vertices: Vertices<'_>,
+        patches: &PrimitiveList,
+        pieces: &mut Pieces<'_>,
+        receive: &mut Receiver<'_>,
+    ) -> Result<(), Stopped> {
+        let shape = Shape {
+            values: self.stage.gives.values.len(),
+            rows: self.stage.output_vertices + 1,
+        };
+        self.shaded.clear();
+        self.primitives.clear(self.tessellation.corners());
+        let most = self.control.stage.groups;
+        for first in (0..patches.len()).step_by(most) {
+            let count = most.min(patches.len() - first);
+            let ran = self.run_control(vertices, patches, first, count);
+            pieces.counters.add_work(&self.control.machine.take_work());
+            pieces
+                .counters
+                .add(Counter::TessellationPatches, count as u64);
+            ran?;
+            self.take_patches(&shape, count);
+            for patch in 0..count {
+                self.divide(&shape, patch, patches.ids[first + patch], pieces)?;
+                if self.shaded.vertices.len() >= ENOUGH_VERTICES {
+                    self.evaluate(&shape, pieces)?;
+                    self.hand_over(pieces, receive)?;
+                }
+            }
+            // The next patches of the control program replace these.
+            self.evaluate(&shape, pieces)?;
+        }
+        self.hand_over(pieces, receive)
+    }
+
+    fn hand_over(
+        &mut self,
+        pieces: &mut Pieces<'_>,
+        receive: &mut Receiver<'_>,
+    ) -> Result<(), Stopped> {
+        if self.primitives.len() > 0 {
+            receive(&self.shaded, &self.primitives, pieces)?;
+        }
+        self.shaded.clear();
+        self.primitives.clear(self.tessellation.corners());
+        Ok(())
+    }
+
+    /// Runs the control program on patches `first` to `first + count`, a lane for each output vertex.
+    fn run_control(
+        &mut self,
+        vertices: Vertices<'_>,
+        patches: &PrimitiveList,
+        first: usize,
+        count: usize,
+    ) -> Result<(), Stopped> {
+        for patch in 0..count {
+            let slots = patches.vertices_of(first + patch);
+            let values = slots.iter().map(|&slot| vertices.vertex(slot));
+            self.control.take(patch, values, &[]);
+        }
+        let per_patch = self.stage.output_vertices;
+        self.control
+            .run(count * per_patch, |input, lane| match input {
+                PrimitiveInput::PrimitiveId => patches.ids[first + lane / per_patch],
+                PrimitiveInput::PatchVertices => patches.per_primitive as u32,
+                _ => 0,
+            })
+    }
+
+    /// Copies what the control program gave, since its next batch replaces it.
+    fn take_patches(&mut self, shape: &Shape, count: usize) {
+        let gives = &self.stage.gives;
+        self.patches.clear();
+        for patch in 0..count as u32 {
+            let start = gives.start + patch * gives.stride;
+            for row in 0..shape.rows as u32 {
+                let is_patch = row as usize + 1 == shape.rows;
+                for value in &gives.values {
+                    let bits = match value.vertex_stride {
+                        Some(stride) if !is_patch => {
+                            self.control.given(start + value.offset + row * stride)
+                        }
+                        None if is_patch => self.control.given(start + value.offset),
+                        _ => 0,
+                    };
+                    host::push(&mut self.patches, bits);
+                }
+            }
+        }
+    }
+
+    /// Divides a patch of the control program's batch, and adds its vertices to batches of the evaluation program.
+    fn divide(
+        &mut self,
+        shape: &Shape,
+        patch: usize,
+        id: u32,
+        pieces: &mut Pieces<'_>,
+    ) -> Result<(), Stopped> {
+        let gives = &self.stage.gives;
+        let start = gives.start + patch as u32 * gives.stride;
+        let level = |offset: Option<u32>| {
+            f32::from_bits(offset.map_or(0, |offset| self.control.given(start + offset)))
+        };
+        let outer = self.stage.outer_levels.map(level);
+        let inner = self.stage.inner_levels.map(level);
+        let mut divided = std::mem::take(&mut self.divided);
+        self.stage
+            .tessellation
+            .tessellate(outer, inner, &mut divided);
+        let first = (self.shaded.vertices.len() + self.batch.points.len()) as u32;
+        let count = divided.indices.len() / self.primitives.per_primitive;
+        for &index in &divided.indices {
+            host::push(&mut self.primitives.vertices, first + index);
+        }
+        let ids = self.primitives.ids.len();
+        host::resize(&mut self.primitives.ids, ids + count, id);
+        let lanes = self.evaluation.stage.lanes;
+        let mut rest = &divided.points[..];
+        while !rest.is_empty() {
+            if self.batch.points.len() == lanes
+                || self.batch.ids.len() == self.evaluation.stage.groups
+            {
+                self.evaluate(shape, pieces)?;
+            }
+            let group = self.batch.ids.len();
+            let values = shape.values * shape.rows;
+            let rows = &self.patches[patch * values..][..values];
+            let (vertices, of_patch) = rows.split_at(values - shape.values);
+            let vertices = vertices.chunks_exact(shape.values.max(1));
+            self.evaluation.take(group, vertices, of_patch);
+            self.batch.ids.push(id);
+            let part = rest.len().min(lanes - self.batch.points.len());
+            self.batch.points.extend(&rest[..part]);
+            self.batch
+                .groups
+                .resize(self.batch.points.len(), group as u32);
+            rest = &rest[part..];
+        }
+        self.divided = divided;
+        Ok(())
+    }
+
+    /// Runs the evaluation program on the vertices that wait.
+    fn evaluate(&mut self, shape: &Shape, pieces: &mut Pieces<'_>) -> Result<(), Stopped> {
+        let batch = &self.batch;
+        let count = batch.points.len();
+        if count == 0 {
+            return Ok(());
+        }
+        let output_vertices = shape.rows as u32 - 1;
+        let ran = self.evaluation.run(count, |input, lane| match input {
+            PrimitiveInput::TessCoord(axis) => batch.points[lane][axis].to_bits(),
+            PrimitiveInput::Patch => batch.groups[lane],
+            PrimitiveInput::PrimitiveId => batch.ids[batch.groups[lane] as usize],
+            PrimitiveInput::PatchVertices => output_vertices,
+            _ => 0,
+        });
+        pieces
+            .counters
+            .add_work(&self.evaluation.machine.take_work());
+        pieces
+            .counters
+            .add(Counter::TessellationInvocations, count as u64);
+        ran?;
+        let machine = &self.evaluation.machine;
+        self.reader
+            .take(count, |slot| machine.output_vectors(slot), &mut self.shaded);
+        self.batch.points.clear();
+        self.batch.groups.clear();
+        self.batch.ids.clear();
+        Ok(())
+    }
+}
