@@ -65,6 +65,8 @@ fn programs() -> DrawPrograms {
         vertex_inputs: attribute(0).chain(attribute(1)).collect(),
         vertex_outputs: position.chain(varyings).collect(),
         varyings: 3,
+        tessellation: None,
+        geometry: None,
         fragment: Some(FragmentPrograms {
             program: Program::default(),
             inputs: inputs.collect(),

@@ -78,6 +78,8 @@ fn programs(rounds: u32) -> DrawPrograms {
         vertex_inputs: attribute(0).chain(attribute(1)).collect(),
         vertex_outputs: position.chain(varyings).collect(),
         varyings: 4,
+        tessellation: None,
+        geometry: None,
         fragment: Some(FragmentPrograms {
             program: fragment_program(rounds),
             inputs: inputs.collect(),

@@ -103,7 +103,7 @@ pub(crate) const MAX_PATCH_SIZE: u32 = 32;
 const MAX_PATCH_COMPONENTS: u32 = 128;
 
 /// The most invocations of a geometry shader for a primitive.
-const MAX_GEOMETRY_INVOCATIONS: u32 = 32;
+const MAX_GEOMETRY_INVOCATIONS: u32 = 127;
 
 /// The most vertices that an invocation of a geometry shader emits.
 const MAX_GEOMETRY_VERTICES: u32 = 256;

@@ -207,6 +207,8 @@ fn shaded(device: &Device, seed: u64, count: u32) -> Vec<Packet> {
         vertex_inputs: inputs.collect(),
         vertex_outputs: position.chain(others).collect(),
         varyings: gaussian::VARYINGS,
+        tessellation: None,
+        geometry: None,
         fragment: None,
     };
     let resolved = FragmentPrograms {
@@ -308,6 +310,8 @@ fn triangles(device: &Device, seed: u64, count: u32) -> Packet {
             .chain((0..4).map(|number| Some(VertexOutput::Varying(number))))
             .collect(),
         varyings: 4,
+        tessellation: None,
+        geometry: None,
         fragment: Some(FragmentPrograms {
             program: program(0..4, 4),
             inputs: (0..4).map(|index| Some(varying(index))).collect(),

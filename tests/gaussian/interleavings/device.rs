@@ -90,6 +90,8 @@ fn programs() -> DrawPrograms {
         vertex_inputs: attribute(0).chain(attribute(1)).collect(),
         vertex_outputs: positions.chain(varyings).collect(),
         varyings: 4,
+        tessellation: None,
+        geometry: None,
         fragment: Some(FragmentPrograms {
             program: fragment.finish().expect("a program"),
             inputs: inputs.collect(),

@@ -67,6 +67,8 @@ pub fn triangle(device: &Device, samples: u32) -> Draw {
             .map(|axis| Some(VertexOutput::Position(axis)))
             .collect(),
         varyings: 0,
+        tessellation: None,
+        geometry: None,
         fragment: None,
     };
     let corners = [
@@ -147,6 +149,8 @@ fn pipeline(device: &Device, with_key: bool) -> Arc<DrawPipeline> {
             .chain((0..gaussian::VARYINGS).map(varying))
             .collect(),
         varyings,
+        tessellation: None,
+        geometry: None,
         fragment: None,
     };
     Arc::new(DrawPipeline::of_gaussians(device.level(), &programs).expect("a pipeline"))

@@ -19,6 +19,8 @@ fn pass_through() -> DrawPrograms {
         vertex_inputs: inputs,
         vertex_outputs: outputs,
         varyings: 4,
+        tessellation: None,
+        geometry: None,
         fragment: Some(fragment(
             &[crate::program::interface::Interpolation::Flat; 4],
         )),

@@ -121,6 +121,8 @@ pub fn programs(extra: &[VertexOutput]) -> DrawPrograms {
         vertex_inputs: inputs,
         vertex_outputs: outputs,
         varyings: 4,
+        tessellation: None,
+        geometry: None,
         fragment: Some(fragment(&[Flat, Flat, Perspective, Linear])),
     }
 }

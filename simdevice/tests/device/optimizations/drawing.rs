@@ -61,6 +61,8 @@ pub fn programs() -> DrawPrograms {
         vertex_inputs: attribute(0).chain(attribute(1)).collect(),
         vertex_outputs: position.chain(varyings).collect(),
         varyings: 4,
+        tessellation: None,
+        geometry: None,
         fragment: Some(FragmentPrograms {
             program: pass_on(4),
             inputs: inputs.collect(),

@@ -164,6 +164,8 @@ fn draw(
         vertex_inputs: Vec::new(),
         vertex_outputs: Vec::new(),
         varyings: per_vertex as u32,
+        tessellation: None,
+        geometry: None,
         fragment,
     };
     let area = Rect {
