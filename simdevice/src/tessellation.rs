@@ -36,7 +36,7 @@ pub struct Tessellation {
     pub domain: Domain,
     /// The spacing.
     pub spacing: Spacing,
-    /// True if triangles are clockwise.
+    /// True if triangles are clockwise where u points right and v down.
     pub clockwise: bool,
     /// True if vertices become points.
     pub point_mode: bool,
@@ -63,8 +63,9 @@ struct Row<'a> {
     positions: &'a [f64],
 }
 
-/// A level just above 1, which a level of 1 becomes where it can't be kept.
-const ABOVE_ONE: f64 = 1.0 + 1.0 / 65536.0;
+/// A level just above 1, which a level of 1 becomes where it can't be kept. It is so near that an inner triangle of odd
+/// spacing has the corners of the domain.
+const ABOVE_ONE: f64 = 1.0 + 1.0 / (1u64 << 30) as f64;
 
 /// Rounds a coordinate to a multiple of 2^-24.
 fn round(coordinate: f64) -> f64 {
@@ -141,7 +142,7 @@ impl TessellatedPatch {
         number
     }
 
-    /// Adds a triangle whose order is counter-clockwise with u to the right and v up.
+    /// Adds a triangle that is clockwise where u points right and v down.
     fn triangle(&mut self, corners: [u32; 3]) {
         self.indices.extend(corners);
     }
@@ -196,7 +197,7 @@ impl Tessellation {
         if self.point_mode {
             out.indices.clear();
             out.indices.extend(0..out.points.len() as u32);
-        } else if self.clockwise && self.corners() == 3 {
+        } else if !self.clockwise && self.corners() == 3 {
             for triangle in out.indices.as_chunks_mut::<3>().0 {
                 triangle.swap(1, 2);
             }
@@ -298,8 +299,13 @@ impl Tessellation {
                     at(column, row),
                     at(column - 1, row),
                 ];
-                out.triangle([corners[0], corners[1], corners[2]]);
-                out.triangle([corners[0], corners[2], corners[3]]);
+                // The diagonal points to the middle, so that the grid is as symmetric as rings.
+                let is_left = 2 * column < columns.len();
+                let is_low = 2 * row < rows.len();
+                let first = usize::from(is_left != is_low);
+                let corner = |number: usize| corners[(first + number) % 4];
+                out.triangle([corner(0), corner(1), corner(2)]);
+                out.triangle([corner(0), corner(2), corner(3)]);
             }
         }
         let (right, top) = (columns.len() - 1, rows.len() - 1);

@@ -186,9 +186,7 @@ impl<'a> TessellationShader<'a> {
         let outer = self.stage.outer_levels.map(level);
         let inner = self.stage.inner_levels.map(level);
         let mut divided = std::mem::take(&mut self.divided);
-        self.stage
-            .tessellation
-            .tessellate(outer, inner, &mut divided);
+        self.tessellation.tessellate(outer, inner, &mut divided);
         let first = (self.shaded.vertices.len() + self.batch.points.len()) as u32;
         let count = divided.indices.len() / self.primitives.per_primitive;
         for &index in &divided.indices {
