@@ -1,7 +1,10 @@
-//! The fixed-function tessellator: divides the domain of a patch (Vulkan 1.3, "Tessellation").
+//! The fixed-function tessellator: divides the domain of a patch into points, lines or triangles (Vulkan 1.3,
+//! "Tessellation").
 //!
-//! Coordinates are multiples of 2^-24, so that 1 - x is exact: the points of an edge are symmetric about its middle,
-//! the coordinates in a triangle add up to 1, and equal levels give equal points on all edges.
+//! Coordinates are multiples of 2^-24. Hence 1 - x and u + v + w = 1 are exact, and the points of an edge are symmetric
+//! about its middle. The points of an edge depend on its level and the spacing alone, the primitives of the inside on
+//! the inner levels alone, and those between an outer edge and the inside on the levels of both alone. This is the
+//! invariance that Vulkan asks for.
 
 #[cfg(test)]
 mod tests;
@@ -13,19 +16,25 @@ pub const MAX_LEVEL: u32 = 64;
 
 /// The domain of a tessellated patch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[allow(missing_docs, reason = "the names are Vulkan's")]
 pub enum Domain {
+    /// A triangle with barycentric coordinates u, v and w. The outer levels are those of the edges where u, v and w are
+    /// 0. The first inner level is that of the inside.
     Triangles,
+    /// A square with coordinates u and v; w is 0. The outer levels are those of the edges where u is 0, v is 0, u is 1
+    /// and v is 1. The inner levels are those of the inside along u and v.
     Quads,
+    /// Lines along u, at different v; w is 0. The outer levels are the number of lines and that of their segments.
     Isolines,
 }
 
-/// The spacing of the vertices of an edge.
+/// The spacing of the points of an edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[allow(missing_docs, reason = "the names are Vulkan's")]
 pub enum Spacing {
+    /// Equal segments, of which there are as many as the level, rounded up.
     Equal,
+    /// An even number of segments. Two of them grow with the level.
     FractionalEven,
+    /// An odd number of segments. Two of them grow with the level.
     FractionalOdd,
 }
 
@@ -34,140 +43,37 @@ pub enum Spacing {
 pub struct Tessellation {
     /// The domain.
     pub domain: Domain,
-    /// The spacing.
+    /// The spacing. The distances of isolines are equal with any spacing.
     pub spacing: Spacing,
-    /// True if triangles are clockwise where u points right and v down.
+    /// True if triangles are clockwise, with u to the right and v down: Vulkan's `VertexOrderCw` in a domain whose
+    /// origin is its upper left corner. They are clockwise if (b - a) × (c - a) is positive in (u, v). An origin in the
+    /// lower left corner inverts this.
     pub clockwise: bool,
-    /// True if vertices become points.
+    /// True if the points become primitives, each once.
     pub point_mode: bool,
 }
 
 /// A divided patch.
 #[derive(Debug, Default)]
 pub struct TessellatedPatch {
-    /// The vertices' coordinates u, v and w.
+    /// The coordinates u, v and w of the points.
     pub points: Vec<[f32; 3]>,
-    /// The vertices of the primitives, 1 to 3 each.
+    /// The points of the primitives, [`corners`](Tessellation::corners) each.
     pub indices: Vec<u32>,
 }
 
-/// The subdivision of an edge.
-struct Edge {
-    /// The positions of its points, ascending from 0 to 1.
-    positions: Vec<f64>,
-}
+/// The coordinate 1. Coordinates are integers, in units of 2^-24.
+const ONE: u32 = 1 << 24;
 
-/// A row of points and their positions along an edge.
-struct Row<'a> {
-    points: &'a [u32],
-    positions: &'a [f64],
-}
+/// The coordinate 1/2.
+const HALF: u32 = ONE / 2;
 
-/// A level just above 1, which a level of 1 becomes where it can't be kept. It is so near that an inner triangle of odd
-/// spacing has the corners of the domain.
-const ABOVE_ONE: f64 = 1.0 + 1.0 / (1u64 << 30) as f64;
-
-/// Rounds a coordinate to a multiple of 2^-24.
-fn round(coordinate: f64) -> f64 {
-    const UNITS: f64 = (1 << 24) as f64;
-    (coordinate * UNITS).round() / UNITS
-}
-
-impl Spacing {
-    /// The level, limited to the spacing's range.
-    fn clamp(self, level: f32) -> f64 {
-        let level = f64::from(level);
-        let most = f64::from(MAX_LEVEL);
-        match self {
-            // NaN becomes the least level.
-            Self::Equal => level.max(1.0).min(most),
-            Self::FractionalEven => level.max(2.0).min(most),
-            Self::FractionalOdd => level.max(1.0).min(most - 1.0),
-        }
-    }
-
-    /// The number of segments that a clamped level gives.
-    fn segments(self, level: f64) -> usize {
-        let up = level.ceil() as usize;
-        match self {
-            Self::Equal => up,
-            Self::FractionalEven => up + up % 2,
-            Self::FractionalOdd => up + (up + 1) % 2,
-        }
-    }
-
-    /// Divides an edge by a clamped level. With fractional spacing, all but two segments have the length 1 / level, and
-    /// these two, at the same distance from the ends, have what is left.
-    fn divide(self, level: f64) -> Edge {
-        let segments = self.segments(level);
-        let level = match self {
-            Self::Equal => segments as f64,
-            Self::FractionalEven | Self::FractionalOdd => level,
-        };
-        let short = (1.0 - (segments as f64 - 2.0) / level) / 2.0;
-        let before_short = (segments - 1) / 4;
-        let mut positions = vec![0.0; segments + 1];
-        for number in 0..=segments / 2 {
-            let position = if number <= before_short {
-                number as f64 / level
-            } else {
-                (number as f64 - 1.0) / level + short
-            };
-            let position = round(position.min(0.5));
-            positions[number] = position;
-            positions[segments - number] = 1.0 - position;
-        }
-        if segments.is_multiple_of(2) {
-            positions[segments / 2] = 0.5;
-        }
-        Edge { positions }
-    }
-}
-
-impl Edge {
-    fn segments(&self) -> usize {
-        self.positions.len() - 1
-    }
-
-    /// The positions of the points between the first and last `cut`.
-    fn inner(&self, cut: usize) -> &[f64] {
-        &self.positions[cut..=self.segments() - cut]
-    }
-}
-
-impl TessellatedPatch {
-    fn push(&mut self, point: [f64; 3]) -> u32 {
-        let number = self.points.len() as u32;
-        host::push(&mut self.points, point.map(|coordinate| coordinate as f32));
-        number
-    }
-
-    /// Adds a triangle that is clockwise where u points right and v down.
-    fn triangle(&mut self, corners: [u32; 3]) {
-        self.indices.extend(corners);
-    }
-
-    /// Fills the strip between an outer row and an inner one, which is to its left.
-    fn stitch(&mut self, outer: &Row<'_>, inner: &Row<'_>) {
-        let (mut i, mut j) = (0, 0);
-        let (last, inner_last) = (outer.points.len() - 1, inner.points.len() - 1);
-        while i < last || j < inner_last {
-            let middle = |row: &Row<'_>, at: usize| row.positions[at] + row.positions[at + 1];
-            let advances_outer =
-                j == inner_last || (i < last && middle(outer, i) <= middle(inner, j));
-            if advances_outer {
-                self.triangle([outer.points[i], outer.points[i + 1], inner.points[j]]);
-                i += 1;
-            } else {
-                self.triangle([outer.points[i], inner.points[j + 1], inner.points[j]]);
-                j += 1;
-            }
-        }
-    }
-}
+/// The least difference of a fractional level from the next lower one with fewer segments. It keeps segments longer
+/// than 2^-15, so that rounding makes no points equal.
+const LEAST_FRACTION: f64 = 1.0 / 256.0;
 
 impl Tessellation {
-    /// The number of vertices of a primitive.
+    /// The number of points of a primitive.
     pub fn corners(&self) -> usize {
         match self.domain {
             _ if self.point_mode => 1,
@@ -176,216 +82,367 @@ impl Tessellation {
         }
     }
 
-    /// Divides a patch. It has no primitives if one of its outer levels isn't positive.
+    /// Divides a patch with outer and inner levels, of which it uses those of its domain. `out` becomes empty if one of
+    /// the outer levels is not positive.
     pub fn tessellate(&self, outer: [f32; 4], inner: [f32; 2], out: &mut TessellatedPatch) {
         out.points.clear();
         out.indices.clear();
-        let edges = match self.domain {
-            Domain::Triangles => 3,
-            Domain::Quads => 4,
-            Domain::Isolines => 2,
+        let levels = match self.domain {
+            Domain::Triangles => &outer[..3],
+            Domain::Quads => &outer[..],
+            Domain::Isolines => &outer[..2],
         };
-        // NaN isn't positive.
-        if !outer[..edges].iter().all(|level| *level > 0.0) {
+        // NaN is not positive.
+        if !levels.iter().all(|&level| level > 0.0) {
             return;
         }
         match self.domain {
-            Domain::Triangles => self.triangles(outer, inner, out),
-            Domain::Quads => self.quads(outer, inner, out),
-            Domain::Isolines => self.isolines(outer, out),
+            // Edges are walked clockwise with v down: from (1, 0) to (0, 1) in a triangle, from (0, 0) to (1, 0) in a
+            // square.
+            Domain::Triangles => self.triangles([outer[2], outer[0], outer[1]], inner[0], out),
+            Domain::Quads => self.quads([outer[1], outer[2], outer[3], outer[0]], inner, out),
+            Domain::Isolines => self.isolines(outer[0], outer[1], out),
         }
         if self.point_mode {
             out.indices.clear();
+            host::reserve(&mut out.indices, out.points.len());
             out.indices.extend(0..out.points.len() as u32);
-        } else if !self.clockwise && self.corners() == 3 {
-            for triangle in out.indices.as_chunks_mut::<3>().0 {
+        } else if self.corners() == 3 && !self.clockwise {
+            for triangle in out.indices.chunks_exact_mut(3) {
                 triangle.swap(1, 2);
             }
         }
     }
 
-    /// The levels of the inside. A level of 1 is raised if any edge or direction has more segments.
-    fn inner_levels<const N: usize>(&self, outer: &[f32], inner: [f32; N]) -> [f64; N] {
-        let levels = inner.map(|level| self.spacing.clamp(level));
-        let is_one = |level: f64| self.spacing.segments(level) == 1;
-        let outer_ones = outer.iter().all(|level| is_one(self.spacing.clamp(*level)));
-        if outer_ones && levels.iter().all(|level| is_one(*level)) {
-            return levels;
-        }
-        levels.map(|level| if is_one(level) { ABOVE_ONE } else { level })
-    }
-
-    fn edge(&self, level: f32) -> Edge {
-        self.spacing.divide(self.spacing.clamp(level))
-    }
-
-    /// Concentric triangles. The corners are where u, v and w are 1; walking from one to the next keeps the inside to
-    /// the left.
-    fn triangles(&self, outer: [f32; 4], inner: [f32; 2], out: &mut TessellatedPatch) {
-        let [level] = self.inner_levels(&outer[..3], [inner[0]]);
-        let inside = self.spacing.divide(level);
-        // The edge from a corner to the next is where the third coordinate is 0.
-        let edges = [2, 0, 1].map(|third: usize| self.edge(outer[third]));
-        let positions = edges.each_ref().map(|edge| &edge.positions[..]);
-        let mut around = ring(out, positions, 0.0);
-        let segments = inside.segments();
-        if segments == 1 {
-            out.triangle([around[0], around[1], around[2]]);
-            return;
-        }
-        let mut positions = positions;
-        for cut in 1..=segments / 2 {
-            let within = inside.inner(cut);
-            let next = ring(out, [within; 3], inside.positions[cut]);
-            let mut first = 0;
-            for (side, outer_positions) in positions.iter().enumerate() {
-                let outer_row = side_of(&around, first, outer_positions.len());
-                let inner_row = side_of(&next, side * (within.len() - 1), within.len());
-                out.stitch(
-                    &Row {
-                        points: &outer_row,
-                        positions: outer_positions,
-                    },
-                    &Row {
-                        points: &inner_row,
-                        positions: within,
-                    },
-                );
-                first += outer_positions.len() - 1;
+    /// Divides a triangle into concentric ones, of which each has two segments per edge less than the one around it.
+    fn triangles(&self, outer: [f32; 3], inner: f32, out: &mut TessellatedPatch) {
+        let (edges, [inside]) = self.edges(outer, [inner]);
+        let mut around = triangle_ring(out, edges.each_ref().map(Edge::positions), 0);
+        for ring in 1..=inside.segments / 2 {
+            let within = triangle_ring(out, [inside.ring(ring); 3], inside.at[ring]);
+            for (outer, inner) in around.iter().zip(&within) {
+                out.stitch(outer, inner);
             }
-            (around, positions) = (next, [within; 3]);
+            around = within;
         }
-        if around.len() == 3 {
-            out.triangle([around[0], around[1], around[2]]);
+        if !inside.segments.is_multiple_of(2) {
+            out.triangle(around.map(|side| side.first));
         }
     }
 
-    /// A grid inside, and a strip along each edge.
+    /// Divides a square into a grid and a strip along each edge.
     fn quads(&self, outer: [f32; 4], inner: [f32; 2], out: &mut TessellatedPatch) {
-        let levels = self.inner_levels(&outer, inner);
-        let [across, up] = levels.map(|level| self.spacing.divide(level));
-        // The edges v = 0, u = 1, v = 1, u = 0, each walked with the inside to the left.
-        let edges = [1, 2, 3, 0].map(|number: usize| self.edge(outer[number]));
-        let mut around = Vec::new();
-        for (side, edge) in edges.iter().enumerate() {
-            for &position in &edge.positions[..edge.segments()] {
-                let [u, v] = match side {
-                    0 => [position, 0.0],
-                    1 => [1.0, position],
-                    2 => [1.0 - position, 1.0],
-                    _ => [0.0, 1.0 - position],
-                };
-                around.push(out.push([u, v, 0.0]));
-            }
-        }
-        if across.segments() == 1 && up.segments() == 1 {
-            out.triangle([around[0], around[1], around[2]]);
-            out.triangle([around[0], around[2], around[3]]);
+        let (edges, [along_u, along_v]) = self.edges(outer, inner);
+        let around = square_ring(out, edges.each_ref().map(Edge::positions));
+        if along_u.segments == 1 {
+            let [a, b, c, d] = around.map(|side| side.first);
+            out.triangle([a, b, c]);
+            out.triangle([a, c, d]);
             return;
         }
-        let (columns, rows) = (across.inner(1), up.inner(1));
+        let (columns, rows) = (along_u.ring(1), along_v.ring(1));
         let first = out.points.len() as u32;
         for &v in rows {
-            for &u in columns {
-                out.push([u, v, 0.0]);
-            }
+            out.points(columns.iter().map(|&u| [u, v, 0]));
         }
-        let at = |column: usize, row: usize| first + (row * columns.len() + column) as u32;
-        for row in 1..rows.len() {
-            for column in 1..columns.len() {
-                let corners = [
-                    at(column - 1, row - 1),
-                    at(column, row - 1),
-                    at(column, row),
-                    at(column - 1, row),
-                ];
-                // The diagonal points to the middle, so that the grid is as symmetric as rings.
-                let is_left = 2 * column < columns.len();
-                let is_low = 2 * row < rows.len();
-                let first = usize::from(is_left != is_low);
-                let corner = |number: usize| corners[(first + number) % 4];
-                out.triangle([corner(0), corner(1), corner(2)]);
-                out.triangle([corner(0), corner(2), corner(3)]);
-            }
+        let width = columns.len() as u32;
+        let (right, top) = (width - 1, (rows.len() as u32 - 1) * width);
+        for (row, start) in (first..first + top).step_by(columns.len()).enumerate() {
+            let is_low = 2 * row + 2 < rows.len();
+            out.primitives((start..start + right).map(|a| {
+                let [b, c, d] = [a + 1, a + 1 + width, a + width];
+                // Diagonals point to the middle, so that the grid looks like rings.
+                let is_left = 2 * (a - start) + 2 < width;
+                if is_left == is_low {
+                    [a, b, c, a, c, d]
+                } else {
+                    [b, c, d, b, d, a]
+                }
+            }));
         }
-        let (right, top) = (columns.len() - 1, rows.len() - 1);
-        let inner_rows: [Vec<u32>; 4] = [
-            (0..=right).map(|column| at(column, 0)).collect(),
-            (0..=top).map(|row| at(right, row)).collect(),
-            (0..=right).rev().map(|column| at(column, top)).collect(),
-            (0..=top).rev().map(|row| at(0, row)).collect(),
+        let step = width as i32;
+        let within = [
+            Row::of_grid(columns, first, 1),
+            Row::of_grid(rows, first + right, step),
+            Row::of_grid(columns, first + top + right, -1),
+            Row::of_grid(rows, first + top, -step),
         ];
-        let mut before = 0;
-        for ((side, edge), inner_row) in edges.iter().enumerate().zip(&inner_rows) {
-            let outer_row = side_of(&around, before, edge.positions.len());
-            out.stitch(
-                &Row {
-                    points: &outer_row,
-                    positions: &edge.positions,
-                },
-                &Row {
-                    points: inner_row,
-                    // Positions are symmetric, so that the direction makes no difference.
-                    positions: if side.is_multiple_of(2) {
-                        columns
-                    } else {
-                        rows
-                    },
-                },
-            );
-            before += edge.segments();
+        for (outer, inner) in around.iter().zip(&within) {
+            out.stitch(outer, inner);
         }
     }
 
-    /// Lines of equal v, from u = 0 to 1. Their distances are equal, whatever the spacing is.
-    fn isolines(&self, outer: [f32; 4], out: &mut TessellatedPatch) {
-        let lines = Spacing::Equal.divide(Spacing::Equal.clamp(outer[0]));
-        let edge = self.edge(outer[1]);
-        for &v in &lines.positions[..lines.segments()] {
+    /// Makes lines. None is at v = 1.
+    fn isolines(&self, lines: f32, segments: f32, out: &mut TessellatedPatch) {
+        let (lines, line) = (Spacing::Equal.divide(lines), self.spacing.divide(segments));
+        for &v in &lines.positions()[..lines.segments] {
             let first = out.points.len() as u32;
-            for &u in &edge.positions {
-                out.push([u, v, 0.0]);
-            }
-            for number in 0..edge.segments() as u32 {
-                out.indices.extend([first + number, first + number + 1]);
+            out.points(line.positions().iter().map(|&u| [u, v, 0]));
+            out.primitives((first..first + line.segments as u32).map(|point| [point, point + 1]));
+        }
+    }
+
+    /// Divides outer edges, and those of the inside. An inner edge remains undivided only if all others are, too.
+    fn edges<const OUTER: usize, const INNER: usize>(
+        &self,
+        outer: [f32; OUTER],
+        inner: [f32; INNER],
+    ) -> ([Edge; OUTER], [Edge; INNER]) {
+        let outer = outer.map(|level| self.spacing.divide(level));
+        let mut inner = inner.map(|level| self.spacing.divide(level));
+        if outer.iter().chain(&inner).any(|edge| edge.segments > 1) {
+            for edge in inner.iter_mut().filter(|edge| edge.segments == 1) {
+                *edge = self.spacing.divide_just_above_one();
             }
         }
+        (outer, inner)
     }
 }
 
-/// Adds a triangle of points: those of its sides, given by their positions on the edges of the domain. `distance` is the
-/// position of its first points on both edges at a corner. Returns the points, walking around.
-fn ring(out: &mut TessellatedPatch, sides: [&[f64]; 3], distance: f64) -> Vec<u32> {
-    if sides[0].len() == 1 {
-        let third = round(1.0 / 3.0);
-        return vec![out.push([third, third, 1.0 - 2.0 * third])];
-    }
-    let mut points = Vec::new();
-    let height = round(2.0 * distance / 3.0);
-    for (side, positions) in sides.iter().enumerate() {
-        for &position in &positions[..positions.len() - 1] {
-            // The lesser of both coordinates is rounded, so that the points of a side are symmetric.
-            let (lesser, greater_is_first) = (position.min(1.0 - position), position <= 0.5);
-            let lesser = round(lesser - distance / 3.0);
-            let greater = 1.0 - height - lesser;
-            let mut point = [0.0; 3];
-            let (from, to) = if greater_is_first {
-                (greater, lesser)
+impl Spacing {
+    /// Divides an edge. NaN is the least level.
+    fn divide(self, level: f32) -> Edge {
+        let most = MAX_LEVEL as f32;
+        let (least, most) = match self {
+            Self::Equal => (1.0, most),
+            Self::FractionalEven => (2.0, most),
+            Self::FractionalOdd => (1.0, most - 1.0),
+        };
+        let level = f64::from(level.max(least).min(most));
+        let segments = match self {
+            Self::Equal => level.ceil(),
+            Self::FractionalEven => 2.0 * (level / 2.0).ceil(),
+            Self::FractionalOdd => 2.0 * ((level - 1.0) / 2.0).ceil() + 1.0,
+        };
+        let level = match self {
+            Self::Equal => segments,
+            Self::FractionalEven | Self::FractionalOdd => {
+                level.max(segments - 2.0 + LEAST_FRACTION)
+            }
+        };
+        let length = 1.0 / level;
+        let short = (level + 2.0 - segments) / 2.0 * length;
+        let segments = segments as usize;
+        let short_at = short_segment(segments);
+        let mut edge = Edge {
+            at: [0; MAX_LEVEL as usize + 1],
+            segments,
+        };
+        for number in 0..segments.div_ceil(2) {
+            let position = if number <= short_at {
+                number as f64 * length
             } else {
-                (lesser, greater)
+                (number - 1) as f64 * length + short
             };
-            point[side] = from;
-            point[(side + 1) % 3] = to;
-            point[(side + 2) % 3] = height;
-            points.push(out.push(point));
+            edge.at[number] = (position * f64::from(ONE)).round() as u32;
+            edge.at[segments - number] = ONE - edge.at[number];
+        }
+        if segments.is_multiple_of(2) {
+            edge.at[segments / 2] = HALF;
+        }
+        edge
+    }
+
+    /// Divides an inner edge of level 1 beside other edges that are divided. Its level is the limit of those above 1:
+    /// the short segments of odd spacing have the length 0, so that the inside fills the domain, whatever the outer
+    /// levels are.
+    fn divide_just_above_one(self) -> Edge {
+        match self {
+            Self::FractionalOdd => {
+                let mut edge = self.divide(3.0);
+                (edge.at[1], edge.at[2]) = (0, ONE);
+                edge
+            }
+            Self::Equal | Self::FractionalEven => self.divide(2.0),
         }
     }
-    points
 }
 
-/// The points of a side of a ring: `count`, which begin at `first` and may end at the ring's first point.
-fn side_of(ring: &[u32], first: usize, count: usize) -> Vec<u32> {
-    (first..first + count)
-        .map(|place| ring[place % ring.len()])
-        .collect()
+/// The place of the first of the two short segments, which is Direct3D 11's: new segments appear at every second place,
+/// from the ends to the middle, and begin again at the ends when their number has doubled. The other short segment is as
+/// far from the other end.
+fn short_segment(segments: usize) -> usize {
+    let pairs = segments.saturating_sub(2) / 2;
+    match pairs.checked_ilog2() {
+        None => 0,
+        Some(round) => 2 * (pairs - (1 << round)) + 1,
+    }
+}
+
+/// A divided edge.
+struct Edge {
+    /// The positions of the points, ascending from 0 to [`ONE`]; further items are unused.
+    at: [u32; MAX_LEVEL as usize + 1],
+    segments: usize,
+}
+
+impl Edge {
+    /// The positions of all points.
+    fn positions(&self) -> &[u32] {
+        self.ring(0)
+    }
+
+    /// The positions of the points without those that are nearer to the ends than number `ring`.
+    fn ring(&self, ring: usize) -> &[u32] {
+        &self.at[ring..=self.segments - ring]
+    }
+}
+
+/// A row of points along an edge.
+struct Row<'a> {
+    /// The positions of the points.
+    positions: &'a [u32],
+    /// The first point.
+    first: u32,
+    /// The difference of consecutive points, apart from the last one.
+    step: i32,
+    /// The last point.
+    last: u32,
+}
+
+impl<'a> Row<'a> {
+    /// The row of a grid's points that begins at `first`.
+    fn of_grid(positions: &'a [u32], first: u32, step: i32) -> Self {
+        Self {
+            positions,
+            first,
+            step,
+            last: first.wrapping_add_signed(step * (positions.len() as i32 - 1)),
+        }
+    }
+
+    fn segments(&self) -> usize {
+        self.positions.len() - 1
+    }
+
+    fn point(&self, number: usize) -> u32 {
+        if number == self.segments() {
+            self.last
+        } else {
+            self.first.wrapping_add_signed(self.step * number as i32)
+        }
+    }
+
+    /// Twice the position of the middle of a segment.
+    fn middle(&self, segment: usize) -> u32 {
+        self.positions[segment] + self.positions[segment + 1]
+    }
+}
+
+/// Adds the points of a closed ring, of which `point` gives the one at a position of a side. A side ends where the next
+/// one begins.
+fn ring<'a, const SIDES: usize>(
+    out: &mut TessellatedPatch,
+    sides: [&'a [u32]; SIDES],
+    point: impl Fn(usize, u32) -> [u32; 3],
+) -> [Row<'a>; SIDES] {
+    let ring = out.points.len() as u32;
+    let mut side = 0;
+    sides.map(|positions| {
+        let first = out.points.len() as u32;
+        let before_last = &positions[..positions.len() - 1];
+        out.points(before_last.iter().map(|&it| point(side, it)));
+        side += 1;
+        let last = if side == SIDES {
+            ring
+        } else {
+            out.points.len() as u32
+        };
+        Row {
+            positions,
+            first,
+            step: 1,
+            last,
+        }
+    })
+}
+
+/// Adds the points of a square: the whole domain's edges.
+fn square_ring<'a>(out: &mut TessellatedPatch, sides: [&'a [u32]; 4]) -> [Row<'a>; 4] {
+    ring(out, sides, |side, position| match side {
+        0 => [position, 0, 0],
+        1 => [ONE, position, 0],
+        2 => [ONE - position, ONE, 0],
+        _ => [0, ONE - position, 0],
+    })
+}
+
+/// Adds the points of one of the concentric triangles. They are where perpendiculars to the domain's edges, at given
+/// positions, meet the triangle. `corner` is the position on both edges at a corner whose perpendiculars meet in the
+/// triangle's corner.
+fn triangle_ring<'a>(
+    out: &mut TessellatedPatch,
+    sides: [&'a [u32]; 3],
+    corner: u32,
+) -> [Row<'a>; 3] {
+    if corner == HALF {
+        let third = ONE / 3;
+        out.points([[third, third, ONE - 2 * third]].into_iter());
+        return sides.map(|positions| Row::of_grid(positions, out.points.len() as u32 - 1, 1));
+    }
+    // The distance from the edge of a side is two thirds of the position. It is even, so that the middle of a side is
+    // exact.
+    let distance = 2 * ((corner + 1) / 3);
+    // The lesser of the other two coordinates is rounded, so that sides are symmetric.
+    let lesser = |position: u32| position + distance - corner;
+    ring(out, sides, |side, position| {
+        let (to, from) = if position < HALF {
+            let to = lesser(position);
+            (to, ONE - distance - to)
+        } else if position == HALF {
+            ((ONE - distance) / 2, (ONE - distance) / 2)
+        } else {
+            let from = lesser(ONE - position);
+            (ONE - distance - from, from)
+        };
+        match side {
+            0 => [from, to, distance],
+            1 => [distance, from, to],
+            _ => [to, distance, from],
+        }
+    })
+}
+
+impl TessellatedPatch {
+    fn points(&mut self, coordinates: impl ExactSizeIterator<Item = [u32; 3]>) {
+        host::reserve(&mut self.points, coordinates.len());
+        let points = coordinates.map(|point| point.map(|it| it as f32 / ONE as f32));
+        self.points.extend(points);
+    }
+
+    /// Adds primitives of `N` points, or pairs of them.
+    fn primitives<const N: usize>(&mut self, all: impl ExactSizeIterator<Item = [u32; N]>) {
+        let before = self.indices.len();
+        host::resize(&mut self.indices, before + N * all.len(), 0);
+        for (place, indices) in self.indices[before..].chunks_exact_mut(N).zip(all) {
+            place.copy_from_slice(&indices);
+        }
+    }
+
+    fn triangle(&mut self, corners: [u32; 3]) {
+        host::extend(&mut self.indices, &corners);
+    }
+
+    /// Fills the strip between an outer row and the inner one beside it. Triangles alternate by the positions of their
+    /// sides.
+    fn stitch(&mut self, outer: &Row<'_>, inner: &Row<'_>) {
+        let (mut i, mut j) = (0, 0);
+        let (mut a, mut b) = (outer.first, inner.first);
+        self.primitives((0..outer.segments() + inner.segments()).map(|_| {
+            let advances_outer = if i < outer.segments() && j < inner.segments() {
+                outer.middle(i) <= inner.middle(j)
+            } else {
+                i < outer.segments()
+            };
+            if advances_outer {
+                i += 1;
+                let before = std::mem::replace(&mut a, outer.point(i));
+                [before, a, b]
+            } else {
+                j += 1;
+                let before = std::mem::replace(&mut b, inner.point(j));
+                [a, b, before]
+            }
+        }));
+    }
 }

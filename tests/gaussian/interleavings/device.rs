@@ -368,6 +368,7 @@ impl Player {
             state: Arc::new(state),
             attributes: vec![attribute(0), attribute(16)],
             vertex_bindings: Bindings::default(),
+            primitive_bindings: simdevice::packet::PrimitiveBindings::default(),
             fragment_bindings: Bindings::default(),
             indices: None,
             first: 3 * first as u32,

@@ -105,6 +105,7 @@ pub fn triangles(device: &Device, corners: &[[f32; 4]], tested: bool) -> Packet 
         state: Arc::new(state),
         attributes: vec![stream(0), stream(16)],
         vertex_bindings: Bindings::default(),
+        primitive_bindings: simdevice::packet::PrimitiveBindings::default(),
         fragment_bindings: Bindings::default(),
         indices: None,
         first: 0,
