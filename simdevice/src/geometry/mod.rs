@@ -57,7 +57,7 @@ use primitive_stage::Environment;
 use primitive_stages::{PrimitiveStages, StageBindings, StageResources};
 use setup::Setup;
 use shade::{OutputReader, Shaded, Shader};
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, AtomicU32};
 use std::time::Instant;
 use vertex_reuse::{RestartRun, VertexReuse, runs};
 use viewport::Transform;
@@ -111,6 +111,8 @@ pub(crate) struct FrontEnd<'a> {
     segments: u64,
     /// The first segment that was not processed yet.
     next: u64,
+    /// The number of primitives that tessellation has made of the instance, if their numbers are read.
+    presented: Option<AtomicU32>,
 }
 
 impl<'a> FrontEnd<'a> {
@@ -169,6 +171,7 @@ impl<'a> FrontEnd<'a> {
             mixes_instances,
             segments,
             next: 0,
+            presented: draw.pipeline.numbers_primitives().then(AtomicU32::default),
         }
     }
 
@@ -204,7 +207,9 @@ impl<'a> FrontEnd<'a> {
         let mut done: Vec<PrimitiveSegment> = Vec::new();
         let mut bytes = 0;
         while self.next < self.segments && bytes < PART_BYTES {
-            let range = self.next..self.segments.min(self.next + STEP_SEGMENTS);
+            // Segments whose primitives are numbered depend on those before.
+            let count = self.presented.as_ref().map_or(STEP_SEGMENTS, |_| 1);
+            let range = self.next..self.segments.min(self.next + count);
             self.next = range.end;
             let step = self.process(range, counters)?;
             bytes += step.iter().map(PrimitiveSegment::memory_bytes).sum::<u64>();
@@ -353,7 +358,11 @@ impl<'a> Worker<'a> {
             level,
             transform,
         };
-        let environment = Environment { watchdog, view };
+        let environment = Environment {
+            watchdog,
+            view,
+            presented: front.presented.as_ref(),
+        };
         Self {
             front,
             shader: Shader {

@@ -5,6 +5,7 @@ use crate::program::pool::PooledMachine;
 use crate::program::primitive::PrimitiveStage;
 use isa::machine::{LaneMask, Stopped, Watchdog};
 use isa::resources::Resources;
+use std::sync::atomic::AtomicU32;
 
 /// What the programs of a draw share.
 #[derive(Clone, Copy)]
@@ -12,6 +13,9 @@ pub(super) struct Environment<'a> {
     pub watchdog: Watchdog<'a>,
     /// The number of the view that is drawn.
     pub view: u32,
+    /// The number of primitives that tessellation has made of the instance, if their numbers are read. The segments are
+    /// then processed one after the other.
+    pub presented: Option<&'a AtomicU32>,
 }
 
 /// A machine for the program of a stage.

@@ -12,6 +12,7 @@ use crate::tessellation::{TessellatedPatch, Tessellation};
 use devmem::host;
 use isa::machine::Stopped;
 use isa::resources::Resources;
+use std::sync::atomic::Ordering::Relaxed;
 
 /// The number of vertices after which they go on to the next stage.
 const ENOUGH_VERTICES: usize = 8192;
@@ -23,6 +24,7 @@ pub(super) struct TessellationShader<'a> {
     evaluation: StageRunner<'a>,
     reader: OutputReader<'a>,
     tessellation: Tessellation,
+    environment: Environment<'a>,
     /// What the control program gave, patch by patch: the values of each vertex, then those of the patch.
     patches: Vec<u32>,
     divided: TessellatedPatch,
@@ -68,6 +70,7 @@ impl<'a> TessellationShader<'a> {
             evaluation: StageRunner::new(&stage.evaluation, evaluation, environment),
             reader,
             tessellation,
+            environment,
             patches: Vec::new(),
             divided: TessellatedPatch::default(),
             batch: Batch::default(),
@@ -192,8 +195,7 @@ impl<'a> TessellationShader<'a> {
         for &index in &divided.indices {
             host::push(&mut self.primitives.vertices, first + index);
         }
-        let ids = self.primitives.ids.len();
-        host::resize(&mut self.primitives.ids, ids + count, id);
+        self.number(id, count);
         let lanes = self.evaluation.stage.lanes;
         let mut rest = &divided.points[..];
         while !rest.is_empty() {
@@ -218,6 +220,24 @@ impl<'a> TessellationShader<'a> {
         }
         self.divided = divided;
         Ok(())
+    }
+
+    /// Numbers the primitives of a patch: by the patch, or if a later program reads the numbers, by how many came before
+    /// in the instance.
+    fn number(&mut self, patch: u32, count: usize) {
+        let (ids, count) = (&mut self.primitives.ids, count as u32);
+        host::reserve(ids, count as usize);
+        match self.environment.presented {
+            None => ids.extend(std::iter::repeat_n(patch, count as usize)),
+            Some(presented) => {
+                // The instance begins.
+                if patch == 0 {
+                    presented.store(0, Relaxed);
+                }
+                let before = presented.fetch_add(count, Relaxed);
+                ids.extend((0..count).map(|number| before.wrapping_add(number)));
+            }
+        }
     }
 
     /// Runs the evaluation program on the vertices that wait.

@@ -4,7 +4,8 @@ use super::pool::MachinePool;
 use crate::limits::{DRAW_SUBGROUP_SIZE, MAX_CLIP_CULL_DISTANCES};
 use crate::program::fragment::FragmentStage;
 use crate::program::interface::{
-    DrawPrograms, FragmentInput, Interpolation, PrimitiveProgram, VertexInput, VertexOutput,
+    DrawPrograms, FragmentInput, Interpolation, PrimitiveInput, PrimitiveProgram, VertexInput,
+    VertexOutput,
 };
 use crate::program::primitive::{GeometryStage, TessellationStage};
 use fearless_simd::Level;
@@ -85,6 +86,22 @@ impl DrawPipeline {
             geometry: geometry.transpose()?,
             fragment,
         })
+    }
+
+    /// True if a stage after tessellation reads the numbers of primitives, which count those of all patches before.
+    pub(crate) fn numbers_primitives(&self) -> bool {
+        let of_geometry = |stage: &GeometryStage| {
+            let mut inputs = stage.stage.inputs.iter();
+            inputs.any(|(_, input)| *input == PrimitiveInput::PrimitiveId)
+        };
+        let reads = match &self.geometry {
+            Some(stage) => of_geometry(stage),
+            None => self.fragment.as_ref().is_some_and(|stage| {
+                let mut inputs = stage.interface.inputs.iter();
+                inputs.any(|(_, input, _)| *input == FragmentInput::PrimitiveId)
+            }),
+        };
+        self.tessellation.is_some() && reads
     }
 
     /// The outputs of the last stage before rasterization.

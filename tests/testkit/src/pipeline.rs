@@ -64,6 +64,10 @@ pub struct Graphics<'a> {
     pub attributes: Vec<vk::VertexInputAttributeDescription>,
     /// The primitive topology.
     pub topology: vk::PrimitiveTopology,
+    /// The number of vertices of a patch; 0 without tessellation.
+    pub patch_vertices: u32,
+    /// The origin of the domain of patches.
+    pub domain_origin: vk::TessellationDomainOrigin,
     /// True if an index of all ones begins a new primitive.
     pub restart: bool,
     /// Number of viewports and of scissors.
@@ -115,6 +119,8 @@ impl Default for Graphics<'_> {
             divisors: Vec::new(),
             attributes: Vec::new(),
             topology: vk::PrimitiveTopology::TRIANGLE_LIST,
+            patch_vertices: 0,
+            domain_origin: vk::TessellationDomainOrigin::UPPER_LEFT,
             restart: false,
             viewports: 1,
             negative_one_to_one: false,
@@ -223,6 +229,11 @@ impl Graphics<'_> {
         let assembly = vk::PipelineInputAssemblyStateCreateInfo::default()
             .topology(self.topology)
             .primitive_restart_enable(self.restart);
+        let mut origin = vk::PipelineTessellationDomainOriginStateCreateInfo::default()
+            .domain_origin(self.domain_origin);
+        let tessellation = vk::PipelineTessellationStateCreateInfo::default()
+            .patch_control_points(self.patch_vertices)
+            .push_next(&mut origin);
         let mut control = vk::PipelineViewportDepthClipControlCreateInfoEXT::default()
             .negative_one_to_one(self.negative_one_to_one);
         let mut viewport = vk::PipelineViewportStateCreateInfo::default()
@@ -261,6 +272,9 @@ impl Graphics<'_> {
             .depth_stencil_state(&self.depth_stencil)
             .color_blend_state(&blend)
             .dynamic_state(&dynamic);
+        if self.patch_vertices > 0 {
+            info = info.tessellation_state(&tessellation);
+        }
         if self.has_layout {
             info = info.layout(layout);
         }
@@ -325,9 +339,11 @@ pub struct Vertex {
 pub struct PipelineOptions<'a> {
     /// The vertex shader in GLSL.
     pub vertex: &'a str,
+    /// The shaders between the vertex and the fragment shader, in GLSL.
+    pub between: Vec<(Stage, &'a str)>,
     /// The fragment shader in GLSL, or `None` for no fragment stage.
     pub fragment: Option<&'a str>,
-    /// Specialization constants of both stages.
+    /// Specialization constants of all stages.
     pub specialization: Vec<(u32, u32)>,
     /// The vertex bindings.
     pub vertex_bindings: Vec<vk::VertexInputBindingDescription>,
@@ -335,6 +351,10 @@ pub struct PipelineOptions<'a> {
     pub vertex_attributes: Vec<vk::VertexInputAttributeDescription>,
     /// The primitive topology.
     pub topology: vk::PrimitiveTopology,
+    /// The number of vertices of a patch; 0 without tessellation.
+    pub patch_vertices: u32,
+    /// The origin of the domain of patches.
+    pub domain_origin: vk::TessellationDomainOrigin,
     /// True if an index of all ones begins a new primitive.
     pub restart: bool,
     /// True if clip space's depths are from -w, not from 0, to w.
@@ -371,6 +391,7 @@ impl Default for PipelineOptions<'_> {
     fn default() -> Self {
         Self {
             vertex: VERTEX,
+            between: Vec::new(),
             fragment: Some(FRAGMENT),
             specialization: Vec::new(),
             vertex_bindings: vec![binding(0, size_of::<Vertex>() as u32)],
@@ -379,6 +400,8 @@ impl Default for PipelineOptions<'_> {
                 attribute(1, vk::Format::R32G32B32A32_SFLOAT, 16),
             ],
             topology: vk::PrimitiveTopology::TRIANGLE_LIST,
+            patch_vertices: 0,
+            domain_origin: vk::TessellationDomainOrigin::UPPER_LEFT,
             restart: false,
             negative_one_to_one: false,
             raster: vk::PipelineRasterizationStateCreateInfo::default().line_width(1.0),
@@ -472,10 +495,13 @@ impl Pipeline {
             constants: options.specialization.clone(),
             ..Shader::new(flags, compile(stage, source))
         };
-        let (vertex, fragment) = (vk::ShaderStageFlags::VERTEX, vk::ShaderStageFlags::FRAGMENT);
-        let mut shaders = vec![shader(Stage::Vertex, vertex, options.vertex)];
-        let sources = options.fragment.iter();
-        shaders.extend(sources.map(|source| shader(Stage::Fragment, fragment, source)));
+        let fragment = options.fragment.map(|source| (Stage::Fragment, source));
+        let sources = std::iter::once((Stage::Vertex, options.vertex));
+        let sources = sources
+            .chain(options.between.iter().copied())
+            .chain(fragment);
+        let shaders = sources.map(|(stage, source)| shader(stage, stage.flag(), source));
+        let shaders = shaders.collect();
         let push = vk::PushConstantRange::default()
             .stage_flags(vk::ShaderStageFlags::ALL_GRAPHICS)
             .size(128);
@@ -490,6 +516,8 @@ impl Pipeline {
             bindings: options.vertex_bindings.clone(),
             attributes: options.vertex_attributes.clone(),
             topology: options.topology,
+            patch_vertices: options.patch_vertices,
+            domain_origin: options.domain_origin,
             restart: options.restart,
             negative_one_to_one: options.negative_one_to_one,
             raster: options.raster,

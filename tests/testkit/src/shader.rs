@@ -1,5 +1,6 @@
 //! Shaders in GLSL. `glslangValidator` compiles them when a test needs them, and the result is kept for later runs.
 
+use ash::vk;
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
@@ -11,6 +12,12 @@ use std::sync::{LazyLock, Mutex, PoisonError};
 pub enum Stage {
     /// Vertex shaders.
     Vertex,
+    /// Tessellation control shaders.
+    TessellationControl,
+    /// Tessellation evaluation shaders.
+    TessellationEvaluation,
+    /// Geometry shaders.
+    Geometry,
     /// Fragment shaders.
     Fragment,
     /// Compute shaders.
@@ -18,9 +25,24 @@ pub enum Stage {
 }
 
 impl Stage {
+    /// Vulkan's flag of the stage.
+    pub fn flag(self) -> vk::ShaderStageFlags {
+        match self {
+            Self::Vertex => vk::ShaderStageFlags::VERTEX,
+            Self::TessellationControl => vk::ShaderStageFlags::TESSELLATION_CONTROL,
+            Self::TessellationEvaluation => vk::ShaderStageFlags::TESSELLATION_EVALUATION,
+            Self::Geometry => vk::ShaderStageFlags::GEOMETRY,
+            Self::Fragment => vk::ShaderStageFlags::FRAGMENT,
+            Self::Compute => vk::ShaderStageFlags::COMPUTE,
+        }
+    }
+
     fn suffix(self) -> &'static str {
         match self {
             Self::Vertex => "vert",
+            Self::TessellationControl => "tesc",
+            Self::TessellationEvaluation => "tese",
+            Self::Geometry => "geom",
             Self::Fragment => "frag",
             Self::Compute => "comp",
         }

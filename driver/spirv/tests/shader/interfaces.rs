@@ -202,7 +202,7 @@ fn a_vertex_shader_transforms() {
                     component,
                     ..
                 } => (10 * location + component + 100 * lane as u32) as f32,
-                InputSource::BuiltIn { .. } => {
+                InputSource::BuiltIn { .. } | InputSource::Patch => {
                     machine.set_input(slot, lane, 7);
                     continue;
                 }
@@ -227,6 +227,7 @@ fn a_vertex_shader_transforms() {
             let x = 100.0 * lane as f32;
             let expected = match output.target {
                 OutputTarget::Location { component, .. } => 10.0 + component as f32 + x,
+                OutputTarget::VertexCount => panic!("a vertex shader emits no vertices"),
                 OutputTarget::BuiltIn { component, .. } => {
                     let column = |c: u32| (4 * c + component) as f32;
                     column(0) * x + column(1) * (x + 1.0) + column(2) * 7.0 + column(3)

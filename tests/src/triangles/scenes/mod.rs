@@ -5,6 +5,7 @@ use gaurast_testkit::Gpu;
 mod blending;
 mod commands;
 mod depth_stencil;
+mod geometry;
 mod models;
 mod multisample;
 mod passes;
@@ -12,6 +13,7 @@ mod raster;
 mod resources;
 mod shading;
 mod simple;
+mod tessellation;
 mod texture;
 mod topology;
 
@@ -60,6 +62,10 @@ list! {
         dynamic_culling, dynamic_depth_test, dynamic_depth_bias, dynamic_blend_constants, dynamic_topology_and_restart, dynamic_stencil, dynamic_vertex_strides, secondary_command_buffers, clears_within_a_pass, load_and_store, several_pipelines;
     passes:
         render_pass_object, input_attachments, resolve_attachments;
+    geometry:
+        geometry_passes_on, adjacent_vertices, adjacent_vertices_of_indices, strips_of_geometry, invocations_of_geometry, numbers_from_geometry, points_become_quads, interfaces_of_geometry, sizes_and_distances_of_geometry, flat_values_of_strips;
+    tessellation:
+        tessellated_triangles, tessellated_quads, isolines, tessellated_points, windings_of_patches, domain_origins, curved_patches, values_of_patches, discarded_patches, tessellation_and_geometry;
     models:
         african_head, african_head_of_four_samples, duck, bunny;
 }
