@@ -175,7 +175,7 @@ fn main() {
                 push_constants: identity.clone(),
                 ..Bindings::default()
             },
-            primitive_bindings: simdevice::packet::PrimitiveBindings::default(),
+            primitive_bindings: PrimitiveBindings::default(),
             fragment_bindings: Bindings::default(),
             indices: indexed.then(|| IndexStream {
                 buffer: buffer(&list),

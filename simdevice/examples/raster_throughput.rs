@@ -272,7 +272,7 @@ fn measure(device: &Arc<Device>, scene: &Scene) {
         state: Arc::new(state(scene)),
         attributes: vec![stream(0), stream(16)],
         vertex_bindings: Bindings::default(),
-        primitive_bindings: simdevice::packet::PrimitiveBindings::default(),
+        primitive_bindings: PrimitiveBindings::default(),
         fragment_bindings: Bindings::default(),
         indices: None,
         first: 0,

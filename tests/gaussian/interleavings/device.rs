@@ -11,7 +11,8 @@ use simdevice::isa::op::Op;
 use simdevice::packet::{
     Attachment, AttachmentClear, BufferCopyRegion, BufferImageRegion, BufferRange,
     ClearAttachments, ClearImage, CopyBuffer, CopyBufferImage, GaussianAppend, GaussianAttributes,
-    GaussianBegin, LoadOp, Rendering, StoreOp, SubresourceLayers, SubresourceRange,
+    GaussianBegin, LoadOp, PrimitiveBindings, Rendering, StoreOp, SubresourceLayers,
+    SubresourceRange,
 };
 use simdevice::packet::{Dispatch, Draw};
 use simdevice::program::bindings::Bindings;
@@ -368,7 +369,7 @@ impl Player {
             state: Arc::new(state),
             attributes: vec![attribute(0), attribute(16)],
             vertex_bindings: Bindings::default(),
-            primitive_bindings: simdevice::packet::PrimitiveBindings::default(),
+            primitive_bindings: PrimitiveBindings::default(),
             fragment_bindings: Bindings::default(),
             indices: None,
             first: 3 * first as u32,

@@ -10,7 +10,7 @@ use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Rate, Type};
 use simdevice::packet::{
     Attachment, AttributeStream, Draw, GaussianAppend, GaussianBegin, GaussianFragmentStage,
-    LoadOp, Rendering, StoreOp,
+    LoadOp, PrimitiveBindings, Rendering, StoreOp,
 };
 use simdevice::program::bindings::Bindings;
 use simdevice::program::interface::{DrawPrograms, VertexInput, VertexOutput, gaussian};
@@ -98,7 +98,7 @@ pub fn triangle(device: &Device, samples: u32) -> Draw {
             instance_divisor: None,
         }],
         vertex_bindings: Bindings::default(),
-        primitive_bindings: simdevice::packet::PrimitiveBindings::default(),
+        primitive_bindings: PrimitiveBindings::default(),
         fragment_bindings: Bindings::default(),
         indices: None,
         first: 0,
@@ -213,7 +213,7 @@ pub fn draw(device: &Device, outputs: &[OracleOutputs], first: u32, count: u32) 
         state: Arc::new(DrawState::new(Topology::PointList, [0; 2])),
         attributes: (0..3).map(stream).collect(),
         vertex_bindings: Bindings::default(),
-        primitive_bindings: simdevice::packet::PrimitiveBindings::default(),
+        primitive_bindings: PrimitiveBindings::default(),
         fragment_bindings: Bindings::default(),
         indices: None,
         first,

@@ -9,6 +9,7 @@ use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Program, Rate, Type};
 use simdevice::packet::{
     AttachmentClear, AttributeStream, BufferRange, Draw, GaussianBegin, LoadOp, ModelAttributes,
+    PrimitiveBindings,
 };
 use simdevice::program::bindings::Bindings;
 use simdevice::program::interface::{
@@ -105,7 +106,7 @@ pub fn triangles(device: &Device, corners: &[[f32; 4]], tested: bool) -> Packet 
         state: Arc::new(state),
         attributes: vec![stream(0), stream(16)],
         vertex_bindings: Bindings::default(),
-        primitive_bindings: simdevice::packet::PrimitiveBindings::default(),
+        primitive_bindings: PrimitiveBindings::default(),
         fragment_bindings: Bindings::default(),
         indices: None,
         first: 0,
