@@ -99,7 +99,7 @@ specification() {
 step specification specification
 # Builds the tests, and the files that tests start or load: the loader's library and the samples.
 samples=()
-for sample in hello_gaussians hello_triangle picking wobbling_gaussians tilted_plane gallery; do
+for sample in hello_gaussians hello_tessellation hello_triangle picking wobbling_gaussians tilted_plane gallery; do
     samples+=(--example "$sample")
 done
 step "build tests" cargo build "${tests[@]}" "${samples[@]}" --quiet

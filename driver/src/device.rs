@@ -487,8 +487,8 @@ mod tests {
         assert_eq!(
             counts,
             [
-                39, 7, 43, 14, 1, 1, 1, 2, 1, 1, 2, 2, 2, 2, 1, 1, 1, 2, 2, 1, 3, 6, 3, 4, 1, 14,
-                1, 1, 1, 1, 26
+                42, 9, 43, 14, 1, 1, 1, 3, 1, 1, 2, 2, 2, 2, 1, 1, 1, 2, 2, 1, 3, 6, 3, 4, 1, 15,
+                1, 1, 2, 1, 26
             ]
         );
         assert_eq!(count_of(&SUPPORTED), counts.iter().sum::<usize>());
@@ -526,10 +526,10 @@ mod tests {
             assert_eq!(error.result(), vk::Result::ERROR_FEATURE_NOT_PRESENT);
             assert!(error.to_string().contains(name), "{error}");
         };
-        let core = vk::PhysicalDeviceFeatures::default().geometry_shader(true);
+        let core = vk::PhysicalDeviceFeatures::default().sparse_residency_buffer(true);
         refused(
             request(&vk::DeviceCreateInfo::default().enabled_features(&core)),
-            "geometryShader",
+            "sparseResidencyBuffer",
         );
         let mut core = vk::PhysicalDeviceFeatures2::default();
         core.features.sparse_binding = vk::TRUE;

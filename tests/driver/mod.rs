@@ -11,6 +11,7 @@ mod loader_door;
 mod multiview;
 mod pipelines;
 mod presentation;
+mod primitive_stages;
 mod queues;
 mod robustness;
 mod samplers;

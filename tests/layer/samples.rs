@@ -111,8 +111,13 @@ fn a_mistake_of_the_c_program_is_told_on_the_standard_error() {
 }
 
 /// The samples in Rust, with their arguments, and what each leaves or says.
-const SAMPLES: [(&str, &[&str], Left); 6] = [
+const SAMPLES: [(&str, &[&str], Left); 7] = [
     ("hello_gaussians", &[], Left::File("hello_gaussians.png")),
+    (
+        "hello_tessellation",
+        &[],
+        Left::File("hello_tessellation.png"),
+    ),
     ("hello_triangle", &[], Left::File("hello_triangle.png")),
     ("picking", &[], Left::Text(": Gaussian ")),
     (

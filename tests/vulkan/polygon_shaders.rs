@@ -99,21 +99,14 @@ fn a_depth_that_breaks_its_promise_is_written() {
 #[gaurast_runner::test]
 fn stages_without_their_feature_are_refused() {
     let gpu = open();
-    for stage in [
-        vk::ShaderStageFlags::GEOMETRY,
-        vk::ShaderStageFlags::TESSELLATION_CONTROL,
-        vk::ShaderStageFlags::TESSELLATION_EVALUATION,
-        vk::ShaderStageFlags::COMPUTE,
-    ] {
-        let mut request = colored();
-        request.shaders.push(Shader {
-            stage,
-            ..request.shaders[0].clone()
-        });
-        let refused = request.create(&gpu).map(drop);
-        let message = gpu.message_texts().concat();
-        let lacking = vk::Result::ERROR_FEATURE_NOT_PRESENT;
-        assert_eq!(refused, Err(lacking), "{stage:?}: {message}");
-        assert!(message.contains("shader stage"), "{message}");
-    }
+    let mut request = colored();
+    request.shaders.push(Shader {
+        stage: vk::ShaderStageFlags::COMPUTE,
+        ..request.shaders[0].clone()
+    });
+    let refused = request.create(&gpu).map(drop);
+    let message = gpu.message_texts().concat();
+    let lacking = vk::Result::ERROR_FEATURE_NOT_PRESENT;
+    assert_eq!(refused, Err(lacking), "{message}");
+    assert!(message.contains("shader stage"), "{message}");
 }

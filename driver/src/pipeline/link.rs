@@ -10,36 +10,19 @@ use super::link_primitives::{
     self, Given, TessellationShaders, carry_written, components_written, given, gives_memory,
     output_given,
 };
+use super::varyings::{
+    InterfaceComponent, LiveOutputs, Varyings, drop_outputs, vertex_output, zero_inputs,
+};
 use crate::abi::error::Error;
 use gaurast_spirv::{
     BuiltIn, DepthMode, Input, InputSource, Interface, Interpolation, Output, OutputTarget,
     Sampling, ScalarType, Shader,
 };
-use simdevice::isa::ir::{Constant, Output as ProgramOutput, Program};
+use simdevice::isa::ir::Output as ProgramOutput;
 use simdevice::program::interface;
 use simdevice::program::interface::{
     DrawPrograms, FragmentInput, FragmentOutput, FragmentPrograms, VertexInput, VertexOutput,
 };
-use std::collections::HashMap;
-
-/// The outputs of a pipeline's programs that have an effect, and the other state that changes linking.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct LiveOutputs<'a> {
-    /// True for each colour attachment that is written, or whose source's alpha is used.
-    pub(crate) color: &'a [bool],
-    /// True if the second source of blending is read.
-    pub(crate) second_source: bool,
-    /// True if points are drawn, so that the point size is used.
-    pub(crate) points: bool,
-    /// True if the pass has views, each of which is a layer.
-    pub(crate) views: bool,
-}
-
-/// A location and a component of it.
-pub(crate) type InterfaceComponent = (u32, u32);
-
-/// The numbers of varyings, by location and component.
-pub(crate) type Varyings = HashMap<InterfaceComponent, u32>;
 
 /// The shaders of a pipeline's stages.
 pub(crate) struct StageShaders {
@@ -359,32 +342,6 @@ fn writes(interface: &Interface, place: InterfaceComponent) -> bool {
     components_written(interface).any(|written| written == place)
 }
 
-/// Replaces by a constant zero the inputs without a source. (Slots are indices into `inputs`.)
-pub(super) fn zero_inputs<T>(program: &mut Program, inputs: &[Option<T>]) {
-    let Program {
-        inputs: registers,
-        constants,
-        ..
-    } = program;
-    registers.retain(|input| {
-        let is_given = inputs[input.slot as usize].is_some();
-        if !is_given {
-            constants.push(Constant {
-                reg: input.reg,
-                bits: 0,
-            });
-        }
-        is_given
-    });
-}
-
-/// Removes outputs that are never read.
-pub(super) fn drop_outputs<T>(program: &mut Program, outputs: &[Option<T>]) {
-    program
-        .outputs
-        .retain(|output| outputs[output.slot as usize].is_some());
-}
-
 fn vertex_input(input: &Input, stream: impl Fn(u32) -> Option<usize>) -> Option<VertexInput> {
     match input.source {
         InputSource::Location {
@@ -406,40 +363,6 @@ fn vertex_input(input: &Input, stream: impl Fn(u32) -> Option<usize>) -> Option<
             _ => None,
         },
         InputSource::Patch => None,
-    }
-}
-
-/// The meaning of an output of the last stage before rasterization.
-pub(super) fn vertex_output(
-    target: OutputTarget,
-    varyings: &Varyings,
-    live_outputs: LiveOutputs<'_>,
-) -> Option<VertexOutput> {
-    match target {
-        OutputTarget::VertexCount => None,
-        OutputTarget::Location {
-            location,
-            component,
-            ..
-        } => varyings
-            .get(&(location, component))
-            .map(|&index| VertexOutput::Varying(index)),
-        OutputTarget::BuiltIn {
-            built_in,
-            component,
-        } => {
-            let component = component as usize;
-            match built_in {
-                BuiltIn::Position => Some(VertexOutput::Position(component)),
-                BuiltIn::PointSize => live_outputs.points.then_some(VertexOutput::PointSize),
-                BuiltIn::ClipDistance => Some(VertexOutput::ClipDistance(component)),
-                BuiltIn::CullDistance => Some(VertexOutput::CullDistance(component)),
-                BuiltIn::Layer => Some(VertexOutput::Layer),
-                BuiltIn::ViewportIndex => Some(VertexOutput::ViewportIndex),
-                BuiltIn::PrimitiveId => Some(VertexOutput::PrimitiveId),
-                _ => None,
-            }
-        }
     }
 }
 
@@ -521,6 +444,7 @@ mod tests {
     use super::*;
     use gaurast_spirv::{PrimitiveModes, Stage, VertexExchange};
     use simdevice::isa::builder::Builder;
+    use simdevice::isa::ir::Program;
     use simdevice::isa::ir::Rate;
     use simdevice::isa::ir::Type;
 

@@ -1,6 +1,6 @@
 //! Linking of tessellation and geometry programs: the exchange of vertices with the stages before and after them.
 
-use super::link::{
+use super::varyings::{
     InterfaceComponent, LiveOutputs, Varyings, drop_outputs, vertex_output, zero_inputs,
 };
 use crate::abi::error::Error;

@@ -13,6 +13,7 @@ pub(crate) mod stages;
 pub(crate) mod state;
 #[cfg(test)]
 mod tests;
+mod varyings;
 
 use self::compute::ComputePipeline;
 use self::gaussian::GaussianPipeline;

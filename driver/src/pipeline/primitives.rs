@@ -2,13 +2,14 @@
 
 use super::dynamic_state;
 use super::layout::PipelineLayout;
-use super::link::{self, LiveOutputs, StageShaders};
+use super::link::{self, StageShaders};
 use super::link_primitives::{self, TessellationShaders};
 use super::stages::{self, ProgramResources};
 use super::state::{
     self, AttributeSource, Class, FixedFunctionState, GraphicsState, live_color_outputs,
     reads_second_source,
 };
+use super::varyings::LiveOutputs;
 use crate::abi::error::Error;
 use crate::device::Device;
 use crate::physical_device::limits;
@@ -263,7 +264,7 @@ fn check_patches(info: &GraphicsState, tessellates: bool) -> Result<(), Error> {
     let has_patches = topology == vk::PrimitiveTopology::PATCH_LIST;
     if has_patches && !tessellates {
         return Err(Error::usage(
-            "VUID-VkGraphicsPipelineCreateInfo-topology-08889",
+            "VUID-VkGraphicsPipelineCreateInfo-topology-00737",
             "the topology is PATCH_LIST, and there are no tessellation stages",
         ));
     }

@@ -40,7 +40,7 @@ use crate::format::Format;
 use crate::packet::Draw;
 use crate::program::bindings::BoundResources;
 use crate::program::interface::VertexInput;
-use crate::program::vertex::VertexOutputs;
+use crate::program::outputs::VertexOutputs;
 use crate::runtime::Runtime;
 use crate::state::{PolygonMode, Rect};
 use crate::stats::counters::{Counter, Counters};

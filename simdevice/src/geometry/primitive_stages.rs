@@ -9,7 +9,7 @@ use super::tessellation_shader::TessellationShader;
 use super::vertex_reuse::VertexReuse;
 use crate::packet::Draw;
 use crate::program::bindings::BoundResources;
-use crate::program::vertex::VertexOutputs;
+use crate::program::outputs::VertexOutputs;
 use crate::state::Topology;
 use crate::tessellation::Tessellation;
 use fearless_simd::Level;

@@ -14,7 +14,7 @@ use crate::geometry::primitive::PrimitiveKind;
 use crate::geometry::viewport::{ONE, snap_away, snap_length};
 use crate::limits::{MAX_LINE_WIDTH, MAX_POINT_SIZE};
 use crate::program::interface::Interpolation;
-use crate::program::vertex::VertexOutputs;
+use crate::program::outputs::VertexOutputs;
 use crate::simd::{both, three};
 use crate::state::{DrawState, PolygonMode, Rect};
 use devmem::host;

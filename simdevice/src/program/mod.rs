@@ -7,6 +7,7 @@ pub mod bindings;
 pub mod compute;
 pub mod fragment;
 pub mod interface;
+pub(crate) mod outputs;
 pub(crate) mod pool;
 pub(crate) mod primitive;
 pub mod vertex;

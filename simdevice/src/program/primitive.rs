@@ -1,8 +1,8 @@
 //! Tessellation and geometry programs that are compiled for draws. They take vertices from the stage before, and give
 //! others, in the workgroup memory of their batches.
 
+use super::outputs::VertexOutputs;
 use super::pool::MachinePool;
-use super::vertex::VertexOutputs;
 use crate::limits::DRAW_SUBGROUP_SIZE;
 use crate::program::interface::{
     GeometryPrograms, PrimitiveInput, PrimitiveProgram, TessellationPrograms, VertexMemory,

@@ -1,11 +1,11 @@
 //! Vertex programs that are compiled for draws, alone or with the programs of later stages.
 
+use super::outputs::VertexOutputs;
 use super::pool::MachinePool;
-use crate::limits::{DRAW_SUBGROUP_SIZE, MAX_CLIP_CULL_DISTANCES};
+use crate::limits::DRAW_SUBGROUP_SIZE;
 use crate::program::fragment::FragmentStage;
 use crate::program::interface::{
-    DrawPrograms, FragmentInput, Interpolation, PrimitiveInput, PrimitiveProgram, VertexInput,
-    VertexOutput,
+    DrawPrograms, FragmentInput, PrimitiveInput, PrimitiveProgram, VertexInput,
 };
 use crate::program::primitive::{GeometryStage, TessellationStage};
 use fearless_simd::Level;
@@ -35,22 +35,6 @@ pub(crate) struct VertexProgram {
     pub machines: MachinePool,
     pub inputs: Vec<(u32, Rate, VertexInput)>,
     pub outputs: VertexOutputs,
-}
-
-/// The slots of a vertex program's outputs; `None` is not written.
-#[derive(Debug, Default)]
-pub(crate) struct VertexOutputs {
-    pub position: [Option<u32>; 4],
-    pub point_size: Option<u32>,
-    pub clip: [Option<u32>; MAX_CLIP_CULL_DISTANCES],
-    pub cull: [Option<u32>; MAX_CLIP_CULL_DISTANCES],
-    pub layer: Option<u32>,
-    pub viewport: Option<u32>,
-    pub primitive_id: Option<u32>,
-    /// The slots, by number of the varying. Only varyings that a fragment stage may read are included.
-    pub varyings: Vec<Option<u32>>,
-    /// The interpolation, by number of the varying.
-    pub interpolation: Vec<Interpolation>,
 }
 
 impl DrawPipeline {
@@ -165,66 +149,4 @@ impl VertexProgram {
 fn values_taken(program: &PrimitiveProgram) -> u32 {
     let numbers = program.takes.values.iter().map(|value| value.number + 1);
     numbers.max().unwrap_or(0)
-}
-
-impl VertexOutputs {
-    /// The outputs in some slots, with their meanings by slot. `varyings` is the number of varyings.
-    fn new(
-        slots: impl Iterator<Item = u32>,
-        meanings: &[Option<VertexOutput>],
-        varyings: u32,
-        programs: &DrawPrograms,
-    ) -> Self {
-        let mut this = Self {
-            varyings: vec![None; varyings as usize],
-            interpolation: vec![Interpolation::Flat; varyings as usize],
-            ..Self::default()
-        };
-        let fragment_inputs = programs.fragment.iter().flat_map(|stage| &stage.inputs);
-        for input in fragment_inputs.flatten() {
-            if let FragmentInput::Varying {
-                index,
-                interpolation,
-                ..
-            } = *input
-                && let Some(entry) = this.interpolation.get_mut(index as usize)
-            {
-                *entry = interpolation;
-            }
-        }
-        for output in slots {
-            let Some(meaning) = meanings.get(output as usize) else {
-                continue;
-            };
-            let entry = match *meaning {
-                Some(VertexOutput::Position(component)) => this.position.get_mut(component),
-                Some(VertexOutput::PointSize) => Some(&mut this.point_size),
-                Some(VertexOutput::ClipDistance(index)) => this.clip.get_mut(index),
-                Some(VertexOutput::CullDistance(index)) => this.cull.get_mut(index),
-                Some(VertexOutput::Layer) => Some(&mut this.layer),
-                Some(VertexOutput::ViewportIndex) => Some(&mut this.viewport),
-                Some(VertexOutput::PrimitiveId) => Some(&mut this.primitive_id),
-                Some(VertexOutput::Varying(index)) => this.varyings.get_mut(index as usize),
-                None => None,
-            };
-            if let Some(entry) = entry {
-                *entry = Some(output);
-            }
-        }
-        this
-    }
-
-    /// True if vertices have outputs besides position and varyings. The point size counts only if `points`.
-    pub(crate) fn has_optional(&self, points: bool) -> bool {
-        points && self.point_size.is_some()
-            || self.layer.is_some()
-            || self.primitive_id.is_some()
-            || self.viewport.is_some()
-            || self.has_distances()
-    }
-
-    /// True if there are clip or cull distances.
-    pub(crate) fn has_distances(&self) -> bool {
-        self.clip.iter().chain(&self.cull).any(Option::is_some)
-    }
 }

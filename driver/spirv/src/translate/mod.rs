@@ -32,6 +32,7 @@ mod translator;
 mod value;
 mod variables;
 mod vertex_memory;
+mod vertex_places;
 
 use std::collections::HashMap;
 
@@ -54,7 +55,7 @@ use emitter::Emitter;
 use inputs_outputs::InputsOutputs;
 use promoted::PromotedVariables;
 use translator::Translator;
-use vertex_memory::VertexPlaces;
+use vertex_places::VertexPlaces;
 
 pub use options::Options;
 

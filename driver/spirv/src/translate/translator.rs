@@ -13,7 +13,7 @@ use super::inputs_outputs::InputsOutputs;
 use super::options::Options;
 use super::promoted::PromotedVariables;
 use super::value::{EXPLICIT, MemoryLayout, MemoryRef, Pointer, TIGHT, Value};
-use super::vertex_memory::VertexPlaces;
+use super::vertex_places::VertexPlaces;
 use crate::error::{Result, malformed, unsupported};
 use crate::globals::Globals;
 use crate::instruction::Instruction;

@@ -4,8 +4,6 @@
 //! control stage. The batch's memory holds them for each primitive or patch. A geometry stage's outputs are variables
 //! like a vertex stage's; when it emits a vertex, they are stored to memory.
 
-use std::collections::HashMap;
-
 use isa::ir::{Address, Format, Rate, Reg, Space, Type as IrType};
 use isa::op::Op as Ir;
 use spirv::{BuiltIn, Decoration, StorageClass};
@@ -13,6 +11,7 @@ use spirv::{BuiltIn, Decoration, StorageClass};
 use super::inputs_outputs::output_target;
 use super::translator::Translator;
 use super::value::{MemoryRef, TIGHT, scalar_bytes};
+use super::vertex_places::{Array, Emission, Region};
 use crate::error::{Result, malformed};
 use crate::interface::{
     InputSource, MemoryScalar, Output, OutputTarget, ScalarType, Stage, VertexMemory,
@@ -33,59 +32,6 @@ const MAX_PATCH_VERTICES: u32 = 32;
 const MAX_EMITTED_VERTICES: u32 = 256;
 /// The bytes of an emitted vertex before its scalars.
 const VERTEX_HEADER: u32 = 4;
-
-/// A variable with values for each vertex, or for the whole patch.
-#[derive(Clone, Copy, Debug)]
-struct Array {
-    variable: u32,
-    /// The type of the values of one vertex, or of the patch.
-    ty: u32,
-    /// Its first byte in the memory of its primitive or patch.
-    offset: u32,
-    /// The bytes of a vertex; `None` for values of the patch.
-    vertex_stride: Option<u32>,
-}
-
-/// The memory of a stage's inputs or outputs.
-#[derive(Debug, Default)]
-struct Region {
-    arrays: Vec<Array>,
-    start: u32,
-    /// The bytes of a primitive or patch.
-    stride: u32,
-}
-
-/// The emission of vertices by a geometry stage.
-#[derive(Debug)]
-struct Emission {
-    /// The output variables.
-    variables: Vec<u32>,
-    max_vertices: u32,
-    /// The bytes of a vertex.
-    vertex_bytes: u32,
-    /// The byte where the lane's next vertex begins: a variable.
-    next: Reg,
-    /// The number of vertices that the lane emitted: an output.
-    count: Reg,
-    /// 1 if the next vertex is the first of a strip: a variable.
-    begins_strip: Reg,
-}
-
-/// The places of vertices' values in workgroup memory.
-#[derive(Debug, Default)]
-pub struct VertexPlaces {
-    inputs: Region,
-    outputs: Region,
-    places: HashMap<u32, MemoryRef>,
-    emission: Option<Emission>,
-}
-
-impl VertexPlaces {
-    /// The place of a variable, if it is in this memory.
-    pub fn place(&self, variable: u32) -> Option<MemoryRef> {
-        self.places.get(&variable).copied()
-    }
-}
 
 /// Reserves the memory of a tessellation or geometry stage.
 pub fn allocate(t: &mut Translator) -> Result<()> {

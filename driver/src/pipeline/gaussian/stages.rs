@@ -3,11 +3,12 @@
 use crate::abi::error::Error;
 use crate::device::Device;
 use crate::pipeline::layout::PipelineLayout;
-use crate::pipeline::link::{self, InterfaceComponent, LiveOutputs, Varyings};
+use crate::pipeline::link;
 use crate::pipeline::stages::{self, ProgramResources};
 use crate::pipeline::state::{
     AttributeSource, FixedFunctionState, GraphicsState, live_color_outputs, reads_second_source,
 };
+use crate::pipeline::varyings::{InterfaceComponent, LiveOutputs, Varyings};
 use crate::shader_module::ShaderStage;
 use ash::vk;
 use gaurast::vk::{GAUSSIAN_LOCATION_UNUSED_GAURAST, PipelineGaussianStateCreateInfoGAURAST};
