@@ -90,6 +90,11 @@ impl Device {
         &self.features
     }
 
+    /// Reports whether the application enabled an extension.
+    pub(crate) fn has(&self, extension: &CStr) -> bool {
+        self.extensions.contains(&extension)
+    }
+
     /// The simulated device.
     pub(crate) fn simulated(&self) -> &simdevice::Device {
         &self.simulated

@@ -61,7 +61,8 @@ impl PrimitivePipeline {
         if !device.features().primitive_topology_list_restart {
             info.require_no_list_restart()?;
         }
-        let fixed = FixedFunctionState::new(info)?;
+        let mut fixed = FixedFunctionState::new(info)?;
+        fixed.draw.unrestricted_depth = device.has(ash::ext::depth_range_unrestricted::NAME);
         let (dynamic, viewports, scissors) = dynamic(info)?;
         let layout = info.layout.ok_or_else(|| {
             Error::usage(

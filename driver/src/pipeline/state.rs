@@ -767,6 +767,7 @@ impl FixedFunctionState {
             viewports: Vec::new(),
             scissors: Vec::new(),
             depth_clamp: raster.depth_clamp_enable != vk::FALSE,
+            unrestricted_depth: false,
             depth_clip: info.pre_rasterization.depth_clip,
             negative_one_to_one: info.pre_rasterization.negative_one_to_one,
             rasterizer_discard: raster.rasterizer_discard_enable != vk::FALSE,

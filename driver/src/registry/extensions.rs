@@ -36,6 +36,7 @@ pub(crate) const DEVICE: &[Extension] = &[
     (c"VK_EXT_depth_clamp_zero_one", 1),
     (c"VK_EXT_depth_clip_control", 1),
     (c"VK_EXT_depth_clip_enable", 1),
+    (c"VK_EXT_depth_range_unrestricted", 1),
     (c"VK_EXT_descriptor_indexing", 2),
     (c"VK_EXT_extended_dynamic_state", 1),
     (c"VK_EXT_extended_dynamic_state2", 1),
