@@ -478,6 +478,7 @@ mod tests {
             count::<vk::PhysicalDeviceImage2DViewOf3DFeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceNonSeamlessCubeMapFeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceRobustness2FeaturesEXT<'_>>(),
+            count::<vk::PhysicalDeviceShaderEarlyAndLateFragmentTestsFeaturesAMD<'_>>(),
             count::<vk::PhysicalDeviceShaderAtomicFloatFeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceShaderAtomicFloat2FeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceWorkgroupMemoryExplicitLayoutFeaturesKHR<'_>>(),
@@ -492,8 +493,8 @@ mod tests {
         assert_eq!(
             counts,
             [
-                39, 7, 43, 14, 1, 1, 1, 2, 1, 1, 2, 2, 2, 2, 1, 1, 1, 2, 2, 1, 3, 6, 3, 4, 1, 14,
-                1, 1, 1, 1, 26
+                39, 7, 43, 14, 1, 1, 1, 2, 1, 1, 2, 2, 2, 2, 1, 1, 1, 2, 2, 1, 3, 1, 6, 3, 4, 1,
+                14, 1, 1, 1, 1, 26
             ]
         );
         assert_eq!(count_of(&SUPPORTED), counts.iter().sum::<usize>());

@@ -1,4 +1,5 @@
-//! Near and far planes that clip, or don't, whether or not depth is clamped; and a near plane at -w.
+//! Near and far planes that clip, or don't, whether or not depth is clamped; a near plane at -w; and depths that shaders
+//! write.
 
 use ash::vk;
 use gaurast_testkit::{
@@ -137,6 +138,8 @@ fn clip_space_begins_at_minus_w_where_the_pipeline_says_so() {
 /// A depth test of fragments whose shader writes their depth.
 #[derive(Clone, Copy)]
 struct WrittenDepth {
+    /// What the fragment shader declares besides.
+    declarations: &'static str,
     format: vk::Format,
     clamp: bool,
     viewport_depths: [f32; 2],
@@ -146,6 +149,7 @@ struct WrittenDepth {
 
 /// Every depth passes in a floating-point attachment.
 const STORED: WrittenDepth = WrittenDepth {
+    declarations: "",
     format: vk::Format::D32_SFLOAT,
     clamp: false,
     viewport_depths: [0.0, 1.0],
@@ -162,16 +166,19 @@ fn stored_depth(gpu: &Gpu, test: WrittenDepth, written: f32) -> f32 {
             ..TargetOptions::with_depth(test.format)
         },
     );
+    let fragment = format!(
+        "{}
+        layout(location = 0) flat in float depth;
+        layout(location = 0) out vec4 color;
+        void main() {{ color = vec4(1); gl_FragDepth = depth; }}",
+        test.declarations
+    );
     let options = PipelineOptions {
         vertex: "layout(location = 0) in vec4 position;
                  layout(location = 1) in vec4 color;
                  layout(location = 0) flat out float depth;
                  void main() { gl_Position = position; depth = color.x; }",
-        fragment: Some(
-            "layout(location = 0) flat in float depth;
-             layout(location = 0) out vec4 color;
-             void main() { color = vec4(1); gl_FragDepth = depth; }",
-        ),
+        fragment: Some(&fragment),
         raster: vk::PipelineRasterizationStateCreateInfo::default()
             .line_width(1.0)
             .depth_clamp_enable(test.clamp),
@@ -313,4 +320,44 @@ fn viewports_reach_beyond_zero_and_one() {
         red_of_triangle(&gpu, &options, 1.25, 1.0, [-4.0, 4.0]),
         None
     );
+}
+
+/// Shaders with both early and late tests write depths on one side of the primitive's, which is 0.5. The late tests
+/// decide.
+#[gaurast_runner::test(needs = [GLSLANG])]
+fn late_tests_decide_after_early_ones() {
+    const LESS: &str = "#extension GL_EXT_spirv_intrinsics : require
+        spirv_execution_mode(extensions = [\"SPV_AMD_shader_early_and_late_fragment_tests\"], 5017);
+        layout(depth_less) out float gl_FragDepth;";
+    const GREATER: &str = "#extension GL_EXT_spirv_intrinsics : require
+        spirv_execution_mode(extensions = [\"SPV_AMD_shader_early_and_late_fragment_tests\"], 5017);
+        layout(depth_greater) out float gl_FragDepth;";
+    let mut features = vk::PhysicalDeviceShaderEarlyAndLateFragmentTestsFeaturesAMD::default()
+        .shader_early_and_late_fragment_tests(true);
+    let gpu = Gpu::extended(
+        &[ash::amd::shader_early_and_late_fragment_tests::NAME],
+        &mut features,
+    )
+    .expect("a device");
+    for (declarations, written) in [(LESS, 0.25), (GREATER, 0.75)] {
+        // On both sides of the written depth, and beyond the primitive's.
+        for cleared in [0.125, 0.375, 0.625, 0.875] {
+            for (compare, passes) in [
+                (vk::CompareOp::LESS, written < cleared),
+                (vk::CompareOp::GREATER, written > cleared),
+                (vk::CompareOp::NOT_EQUAL, true),
+                (vk::CompareOp::EQUAL, false),
+            ] {
+                let test = WrittenDepth {
+                    declarations,
+                    compare,
+                    cleared,
+                    ..STORED
+                };
+                let expected = if passes { written } else { cleared };
+                let found = stored_depth(&gpu, test, written);
+                assert_eq!(found, expected, "{written} {compare:?} {cleared}");
+            }
+        }
+    }
 }

@@ -268,6 +268,8 @@ pub(crate) struct Features {
     pub(crate) shader_integer_dot_product: bool,
     /// `maintenance4`.
     pub(crate) maintenance4: bool,
+    /// `shaderEarlyAndLateFragmentTests`.
+    pub(crate) shader_early_and_late_fragment_tests: bool,
     /// `formatA4R4G4B4`.
     pub(crate) format_a4r4g4b4: bool,
     /// `formatA4B4G4R4`.
@@ -625,6 +627,7 @@ pub(crate) const SUPPORTED: Features = Features {
     dynamic_rendering: true,
     shader_integer_dot_product: true,
     maintenance4: true,
+    shader_early_and_late_fragment_tests: true,
     format_a4r4g4b4: true,
     format_a4b4g4r4: true,
     border_color_swizzle: true,
@@ -844,6 +847,7 @@ impl Features {
         dynamic_rendering: false,
         shader_integer_dot_product: false,
         maintenance4: false,
+        shader_early_and_late_fragment_tests: false,
         format_a4r4g4b4: false,
         format_a4b4g4r4: false,
         border_color_swizzle: false,
@@ -972,7 +976,7 @@ impl Features {
     };
 
     /// The features by their names.
-    pub(crate) fn list(&self) -> [(&'static str, bool); 254] {
+    pub(crate) fn list(&self) -> [(&'static str, bool); 255] {
         [
             ("robustBufferAccess", self.robust_buffer_access),
             ("fullDrawIndexUint32", self.full_draw_index_uint32),
@@ -1259,6 +1263,10 @@ impl Features {
             ("dynamicRendering", self.dynamic_rendering),
             ("shaderIntegerDotProduct", self.shader_integer_dot_product),
             ("maintenance4", self.maintenance4),
+            (
+                "shaderEarlyAndLateFragmentTests",
+                self.shader_early_and_late_fragment_tests,
+            ),
             ("formatA4R4G4B4", self.format_a4r4g4b4),
             ("formatA4B4G4R4", self.format_a4b4g4r4),
             ("borderColorSwizzle", self.border_color_swizzle),
@@ -2054,6 +2062,12 @@ impl Features {
         if let Some(out) = structure.cast::<vk::PhysicalDeviceDynamicRenderingFeatures<'_>>() {
             out.dynamic_rendering = self.dynamic_rendering.into();
         }
+        if let Some(out) =
+            structure.cast::<vk::PhysicalDeviceShaderEarlyAndLateFragmentTestsFeaturesAMD<'_>>()
+        {
+            out.shader_early_and_late_fragment_tests =
+                self.shader_early_and_late_fragment_tests.into();
+        }
         if let Some(out) = structure.cast::<vk::PhysicalDevice4444FormatsFeaturesEXT<'_>>() {
             out.format_a4r4g4b4 = self.format_a4r4g4b4.into();
             out.format_a4b4g4r4 = self.format_a4b4g4r4.into();
@@ -2657,6 +2671,13 @@ impl Features {
         {
             self.dynamic_rendering |= requested.dynamic_rendering != vk::FALSE;
         }
+        if let Some(requested) = valid::cast::<
+            vk::PhysicalDeviceShaderEarlyAndLateFragmentTestsFeaturesAMD<'_>,
+        >(structure)
+        {
+            self.shader_early_and_late_fragment_tests |=
+                requested.shader_early_and_late_fragment_tests != vk::FALSE;
+        }
         if let Some(requested) =
             valid::cast::<vk::PhysicalDevice4444FormatsFeaturesEXT<'_>>(structure)
         {
@@ -2968,6 +2989,9 @@ impl Features {
 /// The extension without which the features of a structure can't be enabled; features of core need none.
 pub(crate) fn extension_of(structure: vk::StructureType) -> Option<&'static CStr> {
     match structure {
+        vk::PhysicalDeviceShaderEarlyAndLateFragmentTestsFeaturesAMD::STRUCTURE_TYPE => {
+            Some(c"VK_AMD_shader_early_and_late_fragment_tests")
+        }
         vk::PhysicalDevice4444FormatsFeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_4444_formats"),
         vk::PhysicalDeviceBorderColorSwizzleFeaturesEXT::STRUCTURE_TYPE => {
             Some(c"VK_EXT_border_color_swizzle")
