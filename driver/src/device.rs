@@ -478,6 +478,7 @@ mod tests {
             count::<vk::PhysicalDeviceImage2DViewOf3DFeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceNonSeamlessCubeMapFeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceRobustness2FeaturesEXT<'_>>(),
+            count::<vk::PhysicalDeviceShaderClockFeaturesKHR<'_>>(),
             count::<vk::PhysicalDeviceShaderEarlyAndLateFragmentTestsFeaturesAMD<'_>>(),
             count::<vk::PhysicalDeviceShaderAtomicFloatFeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceShaderAtomicFloat2FeaturesEXT<'_>>(),
@@ -493,7 +494,7 @@ mod tests {
         assert_eq!(
             counts,
             [
-                39, 7, 43, 14, 1, 1, 1, 2, 1, 1, 2, 2, 2, 2, 1, 1, 1, 2, 2, 1, 3, 1, 6, 3, 4, 1,
+                39, 7, 43, 14, 1, 1, 1, 2, 1, 1, 2, 2, 2, 2, 1, 1, 1, 2, 2, 1, 3, 2, 1, 6, 3, 4, 1,
                 14, 1, 1, 1, 1, 26
             ]
         );

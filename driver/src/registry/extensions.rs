@@ -109,6 +109,7 @@ pub(crate) const DEVICE: &[Extension] = &[
     (c"VK_KHR_sampler_mirror_clamp_to_edge", 3),
     (c"VK_KHR_separate_depth_stencil_layouts", 1),
     (c"VK_KHR_shader_atomic_int64", 1),
+    (c"VK_KHR_shader_clock", 1),
     (c"VK_KHR_shader_draw_parameters", 1),
     (c"VK_KHR_shader_float16_int8", 1),
     (c"VK_KHR_shader_float_controls", 4),

@@ -512,6 +512,10 @@ pub(crate) struct Features {
     pub(crate) performance_counter_query_pools: bool,
     /// `performanceCounterMultipleQueryPools`.
     pub(crate) performance_counter_multiple_query_pools: bool,
+    /// `shaderSubgroupClock`.
+    pub(crate) shader_subgroup_clock: bool,
+    /// `shaderDeviceClock`.
+    pub(crate) shader_device_clock: bool,
     /// `workgroupMemoryExplicitLayout`.
     pub(crate) workgroup_memory_explicit_layout: bool,
     /// `workgroupMemoryExplicitLayoutScalarBlockLayout`.
@@ -708,6 +712,8 @@ pub(crate) const SUPPORTED: Features = Features {
     gaussian_cut_off: true,
     opacity_compensation_floor: true,
     performance_counter_query_pools: true,
+    shader_subgroup_clock: true,
+    shader_device_clock: true,
     workgroup_memory_explicit_layout: true,
     workgroup_memory_explicit_layout_scalar_block_layout: true,
     workgroup_memory_explicit_layout8_bit_access: true,
@@ -969,6 +975,8 @@ impl Features {
         opacity_compensation_floor: false,
         performance_counter_query_pools: false,
         performance_counter_multiple_query_pools: false,
+        shader_subgroup_clock: false,
+        shader_device_clock: false,
         workgroup_memory_explicit_layout: false,
         workgroup_memory_explicit_layout_scalar_block_layout: false,
         workgroup_memory_explicit_layout8_bit_access: false,
@@ -976,7 +984,7 @@ impl Features {
     };
 
     /// The features by their names.
-    pub(crate) fn list(&self) -> [(&'static str, bool); 255] {
+    pub(crate) fn list(&self) -> [(&'static str, bool); 257] {
         [
             ("robustBufferAccess", self.robust_buffer_access),
             ("fullDrawIndexUint32", self.full_draw_index_uint32),
@@ -1592,6 +1600,8 @@ impl Features {
                 "performanceCounterMultipleQueryPools",
                 self.performance_counter_multiple_query_pools,
             ),
+            ("shaderSubgroupClock", self.shader_subgroup_clock),
+            ("shaderDeviceClock", self.shader_device_clock),
             (
                 "workgroupMemoryExplicitLayout",
                 self.workgroup_memory_explicit_layout,
@@ -2311,6 +2321,10 @@ impl Features {
             out.performance_counter_multiple_query_pools =
                 self.performance_counter_multiple_query_pools.into();
         }
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceShaderClockFeaturesKHR<'_>>() {
+            out.shader_subgroup_clock = self.shader_subgroup_clock.into();
+            out.shader_device_clock = self.shader_device_clock.into();
+        }
         if let Some(out) =
             structure.cast::<vk::PhysicalDeviceWorkgroupMemoryExplicitLayoutFeaturesKHR<'_>>()
         {
@@ -2972,6 +2986,12 @@ impl Features {
                 requested.performance_counter_multiple_query_pools != vk::FALSE;
         }
         if let Some(requested) =
+            valid::cast::<vk::PhysicalDeviceShaderClockFeaturesKHR<'_>>(structure)
+        {
+            self.shader_subgroup_clock |= requested.shader_subgroup_clock != vk::FALSE;
+            self.shader_device_clock |= requested.shader_device_clock != vk::FALSE;
+        }
+        if let Some(requested) =
             valid::cast::<vk::PhysicalDeviceWorkgroupMemoryExplicitLayoutFeaturesKHR<'_>>(structure)
         {
             self.workgroup_memory_explicit_layout |=
@@ -3064,6 +3084,7 @@ pub(crate) fn extension_of(structure: vk::StructureType) -> Option<&'static CStr
         vk::PhysicalDevicePerformanceQueryFeaturesKHR::STRUCTURE_TYPE => {
             Some(c"VK_KHR_performance_query")
         }
+        vk::PhysicalDeviceShaderClockFeaturesKHR::STRUCTURE_TYPE => Some(c"VK_KHR_shader_clock"),
         vk::PhysicalDeviceWorkgroupMemoryExplicitLayoutFeaturesKHR::STRUCTURE_TYPE => {
             Some(c"VK_KHR_workgroup_memory_explicit_layout")
         }

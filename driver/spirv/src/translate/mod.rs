@@ -382,6 +382,7 @@ pub fn is_supported(capability: Capability) -> bool {
             | C::VulkanMemoryModel
             | C::VulkanMemoryModelDeviceScope
             | C::DemoteToHelperInvocation
+            | C::ShaderClockKHR
             | C::AtomicFloat32AddEXT
             | C::AtomicFloat32MinMaxEXT
     )
