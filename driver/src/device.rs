@@ -90,6 +90,11 @@ impl Device {
         &self.features
     }
 
+    /// Reports whether the application enabled an extension.
+    pub(crate) fn has(&self, extension: &CStr) -> bool {
+        self.extensions.contains(&extension)
+    }
+
     /// The simulated device.
     pub(crate) fn simulated(&self) -> &simdevice::Device {
         &self.simulated
@@ -473,6 +478,8 @@ mod tests {
             count::<vk::PhysicalDeviceImage2DViewOf3DFeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceNonSeamlessCubeMapFeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceRobustness2FeaturesEXT<'_>>(),
+            count::<vk::PhysicalDeviceShaderClockFeaturesKHR<'_>>(),
+            count::<vk::PhysicalDeviceShaderEarlyAndLateFragmentTestsFeaturesAMD<'_>>(),
             count::<vk::PhysicalDeviceShaderAtomicFloatFeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceShaderAtomicFloat2FeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceWorkgroupMemoryExplicitLayoutFeaturesKHR<'_>>(),
@@ -487,8 +494,8 @@ mod tests {
         assert_eq!(
             counts,
             [
-                42, 9, 43, 14, 1, 1, 1, 3, 1, 1, 2, 2, 2, 2, 1, 1, 1, 2, 2, 1, 3, 6, 3, 4, 1, 15,
-                1, 1, 2, 1, 26
+                42, 9, 43, 14, 1, 1, 1, 3, 1, 1, 2, 2, 2, 2, 1, 1, 1, 2, 2, 1, 3, 2, 1, 6, 3, 4, 1,
+                15, 1, 1, 2, 1, 26
             ]
         );
         assert_eq!(count_of(&SUPPORTED), counts.iter().sum::<usize>());

@@ -2,6 +2,7 @@
 //! common programs ask for. Each is tested by a program that uses it.
 
 mod addresses;
+mod clock;
 mod conditional;
 mod depth_clip;
 mod descriptors;

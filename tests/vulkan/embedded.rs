@@ -123,14 +123,14 @@ fn what_is_not_there_is_refused() {
     );
 
     let mut features = vk::PhysicalDeviceFeatures2::default();
-    features.features.tessellation_shader = vk::TRUE;
+    features.features.texture_compression_etc2 = vk::TRUE;
     let (error, messages) = refusal(&[], &mut features);
     assert_eq!(error, Some(vk::Result::ERROR_FEATURE_NOT_PRESENT));
     assert_eq!(messages.len(), 1, "{messages:?}");
     let Message { id, text } = &messages[0];
     assert_eq!(id, "GAURAST-error");
     assert!(
-        text.contains("vkCreateDevice") && text.contains("tessellationShader"),
+        text.contains("vkCreateDevice") && text.contains("textureCompressionETC2"),
         "{text}"
     );
 

@@ -71,7 +71,8 @@ impl PrimitivePipeline {
         if !device.features().primitive_topology_list_restart {
             info.require_no_list_restart()?;
         }
-        let fixed = FixedFunctionState::new(info)?;
+        let mut fixed = FixedFunctionState::new(info)?;
+        fixed.draw.unrestricted_depth = device.has(ash::ext::depth_range_unrestricted::NAME);
         let (dynamic, viewports, scissors) = dynamic(info)?;
         let layout = info.layout.ok_or_else(|| {
             Error::usage(
@@ -204,6 +205,7 @@ impl<'a> Stages<'a> {
         let geometry = find(F::GEOMETRY)?;
         let fragment = find(F::FRAGMENT)?;
         require_features(device, tessellation.is_some(), geometry.is_some())?;
+        check_adjacency(device, info.vertex_input.topology)?;
         check_patches(info, tessellation.is_some())?;
         Ok(Self {
             vertex,
@@ -253,6 +255,25 @@ fn require_features(device: &Device, tessellates: bool, has_geometry: bool) -> R
         return Err(Error::usage(
             "VUID-VkPipelineShaderStageCreateInfo-stage-00704",
             "the pipeline has a geometry stage, and geometryShader is not enabled",
+        ));
+    }
+    Ok(())
+}
+
+/// Refuses a topology with adjacent vertices if its feature is not enabled.
+fn check_adjacency(device: &Device, topology: vk::PrimitiveTopology) -> Result<(), Error> {
+    use vk::PrimitiveTopology as T;
+    let is_adjacent = matches!(
+        topology,
+        T::LINE_LIST_WITH_ADJACENCY
+            | T::LINE_STRIP_WITH_ADJACENCY
+            | T::TRIANGLE_LIST_WITH_ADJACENCY
+            | T::TRIANGLE_STRIP_WITH_ADJACENCY
+    );
+    if is_adjacent && !device.features().geometry_shader {
+        return Err(Error::usage(
+            "VUID-VkPipelineInputAssemblyStateCreateInfo-topology-00429",
+            format!("the topology is {topology:?}, and geometryShader is not enabled"),
         ));
     }
     Ok(())

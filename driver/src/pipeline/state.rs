@@ -271,7 +271,14 @@ impl<'a> GraphicsState<'a> {
     pub(super) fn require_no_list_restart(&self) -> Result<(), Error> {
         use vk::PrimitiveTopology as T;
         let topology = self.vertex_input.topology;
-        let is_list = matches!(topology, T::POINT_LIST | T::LINE_LIST | T::TRIANGLE_LIST);
+        let is_list = matches!(
+            topology,
+            T::POINT_LIST
+                | T::LINE_LIST
+                | T::TRIANGLE_LIST
+                | T::LINE_LIST_WITH_ADJACENCY
+                | T::TRIANGLE_LIST_WITH_ADJACENCY
+        );
         if !self.vertex_input.primitive_restart
             || !is_list
             || self.is_dynamic(vk::DynamicState::PRIMITIVE_TOPOLOGY)
@@ -791,6 +798,7 @@ impl FixedFunctionState {
             viewports: Vec::new(),
             scissors: Vec::new(),
             depth_clamp: raster.depth_clamp_enable != vk::FALSE,
+            unrestricted_depth: false,
             depth_clip: info.pre_rasterization.depth_clip,
             negative_one_to_one: info.pre_rasterization.negative_one_to_one,
             rasterizer_discard: raster.rasterizer_discard_enable != vk::FALSE,

@@ -27,6 +27,7 @@ pub(crate) const INSTANCE: &[Extension] = &[
 /// The device extensions.
 pub(crate) const DEVICE: &[Extension] = &[
     (c"VK_GAURAST_gaussian_primitive_topology", 2),
+    (c"VK_AMD_shader_early_and_late_fragment_tests", 1),
     (c"VK_EXT_4444_formats", 1),
     (c"VK_EXT_border_color_swizzle", 1),
     (c"VK_EXT_calibrated_timestamps", 2),
@@ -36,6 +37,7 @@ pub(crate) const DEVICE: &[Extension] = &[
     (c"VK_EXT_depth_clamp_zero_one", 1),
     (c"VK_EXT_depth_clip_control", 1),
     (c"VK_EXT_depth_clip_enable", 1),
+    (c"VK_EXT_depth_range_unrestricted", 1),
     (c"VK_EXT_descriptor_indexing", 2),
     (c"VK_EXT_extended_dynamic_state", 1),
     (c"VK_EXT_extended_dynamic_state2", 1),
@@ -107,6 +109,7 @@ pub(crate) const DEVICE: &[Extension] = &[
     (c"VK_KHR_sampler_mirror_clamp_to_edge", 3),
     (c"VK_KHR_separate_depth_stencil_layouts", 1),
     (c"VK_KHR_shader_atomic_int64", 1),
+    (c"VK_KHR_shader_clock", 1),
     (c"VK_KHR_shader_draw_parameters", 1),
     (c"VK_KHR_shader_float16_int8", 1),
     (c"VK_KHR_shader_float_controls", 4),

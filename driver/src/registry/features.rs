@@ -268,6 +268,8 @@ pub(crate) struct Features {
     pub(crate) shader_integer_dot_product: bool,
     /// `maintenance4`.
     pub(crate) maintenance4: bool,
+    /// `shaderEarlyAndLateFragmentTests`.
+    pub(crate) shader_early_and_late_fragment_tests: bool,
     /// `formatA4R4G4B4`.
     pub(crate) format_a4r4g4b4: bool,
     /// `formatA4B4G4R4`.
@@ -510,6 +512,10 @@ pub(crate) struct Features {
     pub(crate) performance_counter_query_pools: bool,
     /// `performanceCounterMultipleQueryPools`.
     pub(crate) performance_counter_multiple_query_pools: bool,
+    /// `shaderSubgroupClock`.
+    pub(crate) shader_subgroup_clock: bool,
+    /// `shaderDeviceClock`.
+    pub(crate) shader_device_clock: bool,
     /// `workgroupMemoryExplicitLayout`.
     pub(crate) workgroup_memory_explicit_layout: bool,
     /// `workgroupMemoryExplicitLayoutScalarBlockLayout`.
@@ -630,6 +636,7 @@ pub(crate) const SUPPORTED: Features = Features {
     dynamic_rendering: true,
     shader_integer_dot_product: true,
     maintenance4: true,
+    shader_early_and_late_fragment_tests: true,
     format_a4r4g4b4: true,
     format_a4b4g4r4: true,
     border_color_swizzle: true,
@@ -713,6 +720,8 @@ pub(crate) const SUPPORTED: Features = Features {
     gaussian_cut_off: true,
     opacity_compensation_floor: true,
     performance_counter_query_pools: true,
+    shader_subgroup_clock: true,
+    shader_device_clock: true,
     workgroup_memory_explicit_layout: true,
     workgroup_memory_explicit_layout_scalar_block_layout: true,
     workgroup_memory_explicit_layout8_bit_access: true,
@@ -852,6 +861,7 @@ impl Features {
         dynamic_rendering: false,
         shader_integer_dot_product: false,
         maintenance4: false,
+        shader_early_and_late_fragment_tests: false,
         format_a4r4g4b4: false,
         format_a4b4g4r4: false,
         border_color_swizzle: false,
@@ -973,6 +983,8 @@ impl Features {
         opacity_compensation_floor: false,
         performance_counter_query_pools: false,
         performance_counter_multiple_query_pools: false,
+        shader_subgroup_clock: false,
+        shader_device_clock: false,
         workgroup_memory_explicit_layout: false,
         workgroup_memory_explicit_layout_scalar_block_layout: false,
         workgroup_memory_explicit_layout8_bit_access: false,
@@ -980,7 +992,7 @@ impl Features {
     };
 
     /// The features by their names.
-    pub(crate) fn list(&self) -> [(&'static str, bool); 254] {
+    pub(crate) fn list(&self) -> [(&'static str, bool); 257] {
         [
             ("robustBufferAccess", self.robust_buffer_access),
             ("fullDrawIndexUint32", self.full_draw_index_uint32),
@@ -1267,6 +1279,10 @@ impl Features {
             ("dynamicRendering", self.dynamic_rendering),
             ("shaderIntegerDotProduct", self.shader_integer_dot_product),
             ("maintenance4", self.maintenance4),
+            (
+                "shaderEarlyAndLateFragmentTests",
+                self.shader_early_and_late_fragment_tests,
+            ),
             ("formatA4R4G4B4", self.format_a4r4g4b4),
             ("formatA4B4G4R4", self.format_a4b4g4r4),
             ("borderColorSwizzle", self.border_color_swizzle),
@@ -1592,6 +1608,8 @@ impl Features {
                 "performanceCounterMultipleQueryPools",
                 self.performance_counter_multiple_query_pools,
             ),
+            ("shaderSubgroupClock", self.shader_subgroup_clock),
+            ("shaderDeviceClock", self.shader_device_clock),
             (
                 "workgroupMemoryExplicitLayout",
                 self.workgroup_memory_explicit_layout,
@@ -2062,6 +2080,12 @@ impl Features {
         if let Some(out) = structure.cast::<vk::PhysicalDeviceDynamicRenderingFeatures<'_>>() {
             out.dynamic_rendering = self.dynamic_rendering.into();
         }
+        if let Some(out) =
+            structure.cast::<vk::PhysicalDeviceShaderEarlyAndLateFragmentTestsFeaturesAMD<'_>>()
+        {
+            out.shader_early_and_late_fragment_tests =
+                self.shader_early_and_late_fragment_tests.into();
+        }
         if let Some(out) = structure.cast::<vk::PhysicalDevice4444FormatsFeaturesEXT<'_>>() {
             out.format_a4r4g4b4 = self.format_a4r4g4b4.into();
             out.format_a4b4g4r4 = self.format_a4b4g4r4.into();
@@ -2304,6 +2328,10 @@ impl Features {
             out.performance_counter_query_pools = self.performance_counter_query_pools.into();
             out.performance_counter_multiple_query_pools =
                 self.performance_counter_multiple_query_pools.into();
+        }
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceShaderClockFeaturesKHR<'_>>() {
+            out.shader_subgroup_clock = self.shader_subgroup_clock.into();
+            out.shader_device_clock = self.shader_device_clock.into();
         }
         if let Some(out) =
             structure.cast::<vk::PhysicalDeviceWorkgroupMemoryExplicitLayoutFeaturesKHR<'_>>()
@@ -2665,6 +2693,13 @@ impl Features {
         {
             self.dynamic_rendering |= requested.dynamic_rendering != vk::FALSE;
         }
+        if let Some(requested) = valid::cast::<
+            vk::PhysicalDeviceShaderEarlyAndLateFragmentTestsFeaturesAMD<'_>,
+        >(structure)
+        {
+            self.shader_early_and_late_fragment_tests |=
+                requested.shader_early_and_late_fragment_tests != vk::FALSE;
+        }
         if let Some(requested) =
             valid::cast::<vk::PhysicalDevice4444FormatsFeaturesEXT<'_>>(structure)
         {
@@ -2959,6 +2994,12 @@ impl Features {
                 requested.performance_counter_multiple_query_pools != vk::FALSE;
         }
         if let Some(requested) =
+            valid::cast::<vk::PhysicalDeviceShaderClockFeaturesKHR<'_>>(structure)
+        {
+            self.shader_subgroup_clock |= requested.shader_subgroup_clock != vk::FALSE;
+            self.shader_device_clock |= requested.shader_device_clock != vk::FALSE;
+        }
+        if let Some(requested) =
             valid::cast::<vk::PhysicalDeviceWorkgroupMemoryExplicitLayoutFeaturesKHR<'_>>(structure)
         {
             self.workgroup_memory_explicit_layout |=
@@ -2976,6 +3017,9 @@ impl Features {
 /// The extension without which the features of a structure can't be enabled; features of core need none.
 pub(crate) fn extension_of(structure: vk::StructureType) -> Option<&'static CStr> {
     match structure {
+        vk::PhysicalDeviceShaderEarlyAndLateFragmentTestsFeaturesAMD::STRUCTURE_TYPE => {
+            Some(c"VK_AMD_shader_early_and_late_fragment_tests")
+        }
         vk::PhysicalDevice4444FormatsFeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_4444_formats"),
         vk::PhysicalDeviceBorderColorSwizzleFeaturesEXT::STRUCTURE_TYPE => {
             Some(c"VK_EXT_border_color_swizzle")
@@ -3048,6 +3092,7 @@ pub(crate) fn extension_of(structure: vk::StructureType) -> Option<&'static CStr
         vk::PhysicalDevicePerformanceQueryFeaturesKHR::STRUCTURE_TYPE => {
             Some(c"VK_KHR_performance_query")
         }
+        vk::PhysicalDeviceShaderClockFeaturesKHR::STRUCTURE_TYPE => Some(c"VK_KHR_shader_clock"),
         vk::PhysicalDeviceWorkgroupMemoryExplicitLayoutFeaturesKHR::STRUCTURE_TYPE => {
             Some(c"VK_KHR_workgroup_memory_explicit_layout")
         }

@@ -169,7 +169,7 @@ pub(crate) fn enables(capability: Capability) -> &'static [Enable] {
         Capability::VariablePointers => {
             &[Enable::Feature("variablePointers", |f| f.variable_pointers)]
         }
-        Capability::ShaderClockKHR => &[Enable::Absent("VK_KHR_shader_clock")],
+        Capability::ShaderClockKHR => &[Enable::Extension(c"VK_KHR_shader_clock")],
         Capability::StencilExportEXT => &[Enable::Absent("VK_EXT_shader_stencil_export")],
         Capability::ImageReadWriteLodAMD => &[Enable::Absent("VK_AMD_shader_image_load_store_lod")],
         Capability::ImageGatherBiasLodAMD => &[Enable::Absent("VK_AMD_texture_gather_bias_lod")],

@@ -58,6 +58,7 @@
 #![forbid(unsafe_code)]
 
 pub mod builder;
+pub mod clock;
 mod compiler;
 pub mod ir;
 mod kernels;

@@ -69,10 +69,11 @@ impl CenterDepth {
         let [near, far] = self.range;
         let [factor, summand] = self.to_unit;
         let unit = clamp(depth * factor + summand);
-        let depth = clamp(near + unit * (far - near));
+        let depth = near + unit * (far - near);
         match self.code {
-            DepthEncoding::Float => (depth as f32).to_bits(),
+            DepthEncoding::Float => self.code.encode_one(depth as f32),
             DepthEncoding::Unorm(bits) => {
+                let depth = clamp(depth);
                 let greatest = f64::from((1u32 << bits) - 1);
                 #[cfg(feature = "mistakes")]
                 if crate::mistakes::Mistake::DepthRoundedDown.is_made() {
@@ -150,10 +151,11 @@ mod tests {
             )
         };
         let float = of(Format::D32Sfloat);
-        assert_eq!(float.code(1.0), 0);
-        assert_eq!(float.code(0.5), 0, "nearer than the near plane");
-        assert_eq!(float.code(9.0), 1.0f32.to_bits(), "beyond the far plane");
-        let (two, expected) = (f32::from_bits(float.code(2.0)), 2.0 / 3.0);
+        let at = |z| float.unit().decode(float.code(z));
+        assert_eq!(at(1.0), 0.0);
+        assert_eq!(at(0.5), 0.0, "nearer than the near plane");
+        assert_eq!(at(9.0), 1.0, "beyond the far plane");
+        let (two, expected) = (at(2.0), 2.0 / 3.0);
         assert!((two - expected).abs() < 1e-6, "{two}");
         assert_eq!(of(Format::D16Unorm).code(2.0), 43690);
         assert_eq!(of(Format::X8D24UnormPack32).code(4.0), (1 << 24) - 1);
@@ -174,9 +176,9 @@ mod tests {
             (0.5, 0.625),
             (3.0, 0.75),
         ] {
-            assert_eq!(f32::from_bits(both.code(z)), expected, "{z}");
+            assert_eq!(both.unit().decode(both.code(z)), expected, "{z}");
         }
-        assert_eq!(f32::from_bits(unit.code(0.5)), 0.5);
+        assert_eq!(unit.unit().decode(unit.code(0.5)), 0.5);
     }
 
     #[gaurast_runner::test]
@@ -212,6 +214,12 @@ mod tests {
                 [1.0, 0.0],
                 DepthTrend::Falling,
             ),
+            (
+                CameraModel::Pinhole,
+                [1.0, -1.0],
+                [-3.0, 2.0],
+                DepthTrend::Rising,
+            ),
         ];
         for (model, coefficients, range, trend) in cases {
             for format in [
@@ -237,7 +245,7 @@ mod tests {
                 );
                 let [low, high] = [range[0].min(range[1]), range[0].max(range[1])];
                 if format == Format::D32Sfloat {
-                    let inside = |&code: &u32| (low..=high).contains(&f32::from_bits(code));
+                    let inside = |&code: &u32| (low..=high).contains(&depth.unit().decode(code));
                     assert!(codes.iter().all(inside));
                 }
             }

@@ -1,6 +1,7 @@
 //! The depth sort: a stable radix sort on only those bits that differ. Sequences that exceed a cache are first
 //! partitioned by ranges of keys, and each part is sorted for itself. Workers share both steps.
 
+use crate::format::depth::{ordered, unordered};
 use devmem::host;
 use rayon::prelude::*;
 use std::sync::{Mutex, PoisonError};
@@ -10,21 +11,12 @@ type SortEntry = (u32, u32);
 
 /// The integer that orders as a binary32 number does (negative zero before zero).
 pub(super) fn ordered_bits(value: f32) -> u32 {
-    let bits = value.to_bits();
-    if bits >> 31 == 0 {
-        bits | 1 << 31
-    } else {
-        !bits
-    }
+    ordered(value.to_bits())
 }
 
 /// The number whose [`ordered_bits`] are `bits`.
 pub(super) fn value_of(bits: u32) -> f32 {
-    f32::from_bits(if bits >> 31 == 1 {
-        bits & !(1 << 31)
-    } else {
-        !bits
-    })
+    f32::from_bits(unordered(bits))
 }
 
 /// The most bits of a digit: the first-level cache holds a line for each value of it.

@@ -9,7 +9,7 @@ use crate::state::DepthBias;
 pub(super) enum DepthUnit {
     /// The same for all depths.
     Fixed(f32),
-    /// The unit in the last place of a binary32 number with the exponent of the polygon's greatest depth.
+    /// The unit in the last place of a binary32 number with the exponent of the polygon's depth of greatest magnitude.
     Float,
 }
 
@@ -56,7 +56,7 @@ pub(super) fn bias(bias: &DepthBias, unit: DepthUnit, corners: [&WindowVertex; 3
     let along_y = ((e[2] * f[0] - e[0] * f[2]) * inverse).abs();
     let slope = along_x.max(along_y);
     let slope = if slope.is_finite() { slope } else { 0.0 };
-    let greatest = a.depth.max(b.depth).max(c.depth);
+    let greatest = a.depth.abs().max(b.depth.abs()).max(c.depth.abs());
     let offset = unit.at(greatest) * bias.constant + slope * bias.slope;
     if bias.clamp > 0.0 {
         offset.min(bias.clamp)

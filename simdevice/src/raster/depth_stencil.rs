@@ -1,7 +1,7 @@
 //! Depth and stencil tests (Vulkan 1.3, 27.10 to 27.14).
 //!
-//! Depths are compared in the encoding of the attachment: the integer of a normalised format, or the bits of a
-//! floating-point one, which are ordered as the numbers are because depth is clamped to 0 to 1.
+//! Depths are compared in the encoding of the attachment, whose codes are ordered as the depths are (see
+//! [`DepthEncoding`]).
 
 use crate::format::Format;
 use crate::format::depth::DepthEncoding;

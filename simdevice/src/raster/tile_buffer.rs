@@ -2,12 +2,15 @@
 //! tiles.
 //!
 //! A tile (16x16 pixels) of an attachment is loaded or cleared when a draw first touches it, and is stored only then. A
-//! tile that no draw touches is never loaded, and cleared only in memory. Texels have the same bytes as in memory, so
-//! that a store and a load in the middle of a pass change nothing. Depths are in their format's encoding (see
-//! [`super::depth_stencil`]). Tiles rather than macro-tiles are loaded and stored, so that the result is independent of
+//! tile that no draw touches is never loaded, and cleared only in memory. Texels have the same bytes as in memory, but
+//! for depths, which are in their format's encoding (see [`DepthEncoding`]), so that a store and a load in the middle of
+//! a pass change nothing. Tiles rather than macro-tiles are loaded and stored, so that the result is independent of
 //! the size of macro-tiles.
+//!
+//! [`DepthEncoding`]: crate::format::depth::DepthEncoding
 
 use super::tile::{AREA, SIDE, Tile, place};
+use crate::format::depth::{ordered, unordered};
 use crate::format::unorm8::{pack_unorm8, unorm8_fraction};
 use crate::format::{Aspect, Format, MAX_TEXEL_SIZE};
 use crate::image::resolve::resolve_row;
@@ -48,6 +51,8 @@ enum Kind {
     Depth16,
     /// A 24-bit depth in 32 bits, of which the upper ones are unused in memory.
     Depth24,
+    /// A floating-point depth, whose bits in the buffer are ordered as depths are.
+    DepthFloat,
 }
 
 impl Kind {
@@ -55,6 +60,7 @@ impl Kind {
         match format {
             Format::D16Unorm => Self::Depth16,
             Format::X8D24UnormPack32 => Self::Depth24,
+            Format::D32Sfloat => Self::DepthFloat,
             _ => Self::Same,
         }
     }
@@ -64,7 +70,7 @@ impl Kind {
 fn stride(format: Format) -> usize {
     match Kind::of(format) {
         Kind::Same => format.texel_size(),
-        Kind::Depth16 | Kind::Depth24 => 4,
+        Kind::Depth16 | Kind::Depth24 | Kind::DepthFloat => 4,
     }
 }
 
@@ -75,9 +81,21 @@ fn unpack(format: Format, bytes: &[u8]) -> [u8; MAX_TEXEL_SIZE] {
         Kind::Same => format.texel_size(),
         Kind::Depth16 => 2,
         Kind::Depth24 => 3,
+        Kind::DepthFloat => 4,
     };
     texel[..size].copy_from_slice(&bytes[..size]);
+    if matches!(Kind::of(format), Kind::DepthFloat) {
+        change_words(&mut texel[..size], ordered);
+    }
     texel
+}
+
+/// Applies a function to each word of a row of texels.
+#[inline(always)]
+fn change_words(bytes: &mut [u8], change: impl Fn(u32) -> u32) {
+    for word in bytes.as_chunks_mut::<4>().0 {
+        *word = change(u32::from_ne_bytes(*word)).to_ne_bytes();
+    }
 }
 
 impl TileBuffer {
@@ -196,7 +214,10 @@ impl TileBuffer {
             for (y, columns) in tile.rows(tile.pixels) {
                 let bytes = &mut bytes[..columns.len() * size];
                 rows.read(tile.pixel(columns.start, y), bytes);
-                if stride == size && matches!(Kind::of(format), Kind::Same) {
+                if matches!(Kind::of(format), Kind::DepthFloat) {
+                    change_words(bytes, ordered);
+                }
+                if matches!(Kind::of(format), Kind::Same | Kind::DepthFloat) {
                     set_row(texels, size, y, columns.start, bytes);
                     continue;
                 }
@@ -237,6 +258,9 @@ impl TileBuffer {
                         // The bytes of a depth in memory are the lower ones.
                         out.copy_from_slice(&texels[place(x, y) * stride..][..size]);
                     }
+                }
+                if touched && matches!(Kind::of(target.format()), Kind::DepthFloat) {
+                    change_words(bytes, unordered);
                 }
                 rows.write(at, bytes);
             }
@@ -285,6 +309,9 @@ impl TileBuffer {
                 let bytes = &mut row[..count * size];
                 for (x, out) in columns.clone().zip(bytes.chunks_exact_mut(size)) {
                     out.copy_from_slice(&texels[place(x, y) * stride..][..size]);
+                }
+                if matches!(Kind::of(format), Kind::DepthFloat) {
+                    change_words(bytes, unordered);
                 }
                 if !copied {
                     format.decode_row(bytes, &mut decoded[..count]);

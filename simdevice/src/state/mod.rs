@@ -285,6 +285,8 @@ pub struct DrawState {
     pub scissors: Vec<Rect>,
     /// True if depth is clamped to the viewport's range, and primitives are not clipped at the near and far planes.
     pub depth_clamp: bool,
+    /// True if depths of a floating-point attachment may be less than 0 or more than 1. Otherwise they are clamped.
+    pub unrestricted_depth: bool,
     /// True if primitives are clipped at the near and far planes. `None` follows from `depth_clamp`.
     pub depth_clip: Option<bool>,
     /// True if clip space's depths are from -w, not from 0, to w.
@@ -350,6 +352,7 @@ impl DrawState {
                 height,
             }],
             depth_clamp: false,
+            unrestricted_depth: false,
             depth_clip: None,
             negative_one_to_one: false,
             rasterizer_discard: false,

@@ -2,14 +2,9 @@
 
 use crate::stats::counters::Counters;
 use devmem::host;
-use std::sync::{Condvar, LazyLock, Mutex, MutexGuard, PoisonError};
-use std::time::Instant;
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
-/// The host's monotonic time since the first call in this process, in nanoseconds. Timestamps hold it.
-pub fn host_time() -> u64 {
-    static START: LazyLock<Instant> = LazyLock::new(Instant::now);
-    START.elapsed().as_nanos() as u64
-}
+pub use isa::clock::host_time;
 
 /// The quantity that the queries of a pool measure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -1,6 +1,7 @@
 //! The dispatch of instructions to the functions that translate them.
 
 use isa::ir::Axis;
+use isa::op::Op as Ir;
 use spirv::Op;
 
 use super::atomic::atomic;
@@ -139,6 +140,7 @@ pub fn instruction(t: &mut Translator, it: &Instruction) -> Result<()> {
             let helper = t.emit.builder.is_helper();
             t.define(it, vec![helper])
         }
+        Op::ReadClockKHR => read_clock(t, it),
         Op::AtomicLoad
         | Op::AtomicStore
         | Op::AtomicExchange
@@ -164,6 +166,17 @@ pub fn instruction(t: &mut Translator, it: &Instruction) -> Result<()> {
         op if is_subgroup(op) => subgroup(t, it),
         _ => elementwise(t, it),
     }
+}
+
+/// Reads the clock, which is the same for a subgroup and for the device, as a number of 64 bits or as its two words.
+fn read_clock(t: &mut Translator, it: &Instruction) -> Result<()> {
+    let time = t.emit.builder.clock();
+    let (_, count) = t.globals.types.vector(it.ty()?)?;
+    if count == 1 {
+        return t.define(it, vec![time]);
+    }
+    let words = [Ir::Low32, Ir::High32].map(|word| t.emit.op(word, &[time]));
+    t.define(it, words.to_vec())
 }
 
 fn extended(t: &mut Translator, it: &Instruction) -> Result<()> {

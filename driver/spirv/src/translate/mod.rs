@@ -145,12 +145,17 @@ fn execution_modes(
     stage: Stage,
 ) -> Result<Interface, Error> {
     let mut interface = empty_interface(stage);
+    let mut is_early_and_late = false;
     for it in &module.sections.execution_modes {
         if it.id(0).ok() == Some(entry) {
             execution_mode(globals, it, &mut interface)
                 .map_err(|diagnostic| diagnostic.locate(it.reference()))?;
+            let mode = it.enumerant(1, ExecutionMode::from_u32);
+            is_early_and_late |= mode == Some(ExecutionMode::EarlyAndLateFragmentTestsAMD);
         }
     }
+    // Late tests are needed for a written depth only, and early ones are optional then.
+    interface.early_fragment_tests |= is_early_and_late && interface.depth == DepthMode::NotWritten;
     if stage == Stage::Compute {
         if let Some(size) = built_in_workgroup_size(module, globals) {
             interface.workgroup_size = size;
@@ -425,6 +430,7 @@ pub fn is_supported(capability: Capability) -> bool {
             | C::VulkanMemoryModel
             | C::VulkanMemoryModelDeviceScope
             | C::DemoteToHelperInvocation
+            | C::ShaderClockKHR
             | C::AtomicFloat32AddEXT
             | C::AtomicFloat32MinMaxEXT
     )

@@ -124,6 +124,12 @@ fn a_fragment_shader_says_how_its_inputs_are_interpolated() {
         Some(ScalarType::Uint { width: 32 })
     );
 
+    let found = interface("early_and_late.frag");
+    assert!(found.early_fragment_tests, "nothing needs a late test");
+    let found = interface("early_and_late_depth.frag");
+    assert!(!found.early_fragment_tests);
+    assert_eq!(found.depth, DepthMode::Greater);
+
     let found = interface("interpolation.frag");
     assert!(found.early_fragment_tests);
     assert_eq!(found.descriptors[0].attachment, Some(1));

@@ -264,6 +264,13 @@ impl Builder {
         dst
     }
 
+    /// The host's time in nanoseconds.
+    pub fn clock(&mut self) -> Reg {
+        let dst = self.value(Type::B64);
+        self.statement(Statement::Clock { dst });
+        dst
+    }
+
     /// Loads `count` consecutive elements.
     pub fn load(&mut self, address: Address, format: Format, count: usize) -> Vec<Reg> {
         let dst: Vec<Reg> = (0..count)

@@ -24,6 +24,7 @@ fn has_effect(statement: &Statement) -> bool {
             | Statement::Assign { .. }
             | Statement::LaneIndex { .. }
             | Statement::IsHelper { .. }
+            | Statement::Clock { .. }
             | Statement::Load { .. }
             | Statement::BufferSize { .. }
             | Statement::Sample(_)

@@ -526,9 +526,10 @@ fn contains(block: &Block, wanted: &Statement) -> bool {
 fn kind_of(statement: &Statement) -> Kind {
     match statement {
         Statement::Compute { op, .. } => op.kind(),
-        Statement::Assign { .. } | Statement::LaneIndex { .. } | Statement::IsHelper { .. } => {
-            Kind::Move
-        }
+        Statement::Assign { .. }
+        | Statement::LaneIndex { .. }
+        | Statement::IsHelper { .. }
+        | Statement::Clock { .. } => Kind::Move,
         Statement::Load { .. } | Statement::Store { .. } | Statement::BufferSize { .. } => {
             Kind::Memory
         }

@@ -210,6 +210,7 @@ impl Search {
                 address.space == Space::Private && !self.private_is_uniform
             }
             Statement::Compute { .. }
+            | Statement::Clock { .. }
             | Statement::BufferSize { .. }
             | Statement::ImageQuery { .. } => false,
             _ => true,

@@ -142,6 +142,11 @@ pub enum Statement {
         /// The value defined.
         dst: Reg,
     },
+    /// The host's time in nanoseconds, as [`host_time`](crate::clock::host_time) has it, the same for all lanes; `B64`.
+    Clock {
+        /// The value defined.
+        dst: Reg,
+    },
     /// Loads consecutive elements. An element that is out of range is zero.
     Load {
         /// The values defined, 1 to 16.
@@ -283,6 +288,7 @@ impl Statement {
             | Self::Assign { dst, .. }
             | Self::LaneIndex { dst }
             | Self::IsHelper { dst }
+            | Self::Clock { dst }
             | Self::BufferSize { dst, .. }
             | Self::Derivative { dst, .. } => visit(dst),
             Self::Load { dst, .. } | Self::Subgroup { dst, .. } | Self::ImageQuery { dst, .. } => {
@@ -387,6 +393,7 @@ impl Statement {
             Self::Switch { selector, .. } => visit(selector),
             Self::LaneIndex { .. }
             | Self::IsHelper { .. }
+            | Self::Clock { .. }
             | Self::Barrier
             | Self::Loop { .. }
             | Self::Scope { .. }
@@ -520,6 +527,7 @@ fn write_statement(it: &Statement, depth: usize, f: &mut Formatter<'_>) -> Resul
         Statement::Assign { src, .. } => writeln!(f, "assign {src}"),
         Statement::LaneIndex { .. } => writeln!(f, "lane_index"),
         Statement::IsHelper { .. } => writeln!(f, "is_helper"),
+        Statement::Clock { .. } => writeln!(f, "clock"),
         Statement::Load {
             address, format, ..
         } => writeln!(f, "load {format:?} {address}"),

@@ -267,6 +267,7 @@ impl Checker<'_> {
             Statement::Assign { dst, src } => self.expect(*src, self.type_of(*dst)?),
             Statement::LaneIndex { dst } => self.expect(*dst, Type::B32),
             Statement::IsHelper { dst } => self.expect(*dst, Type::Bool),
+            Statement::Clock { dst } => self.expect(*dst, Type::B64),
             Statement::Load {
                 dst: regs,
                 address,

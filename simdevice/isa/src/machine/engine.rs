@@ -10,6 +10,7 @@ use super::batch::Batch;
 use super::masks::Masks;
 use super::watchdog::{Stopped, Watch};
 use super::{cross_lane, image, memory};
+use crate::clock::host_time;
 use crate::compiler::step::{MaskId, Step};
 use crate::ir::Statement;
 use crate::ir::op::Op;
@@ -263,6 +264,12 @@ fn run_statement<S: Simd>(batch: &Batch<'_>, simd: S, statement: &Statement) {
                 let helpers = batch.masks.bits(MaskId::HELPER, vector);
                 let lanes: [bool; 16] = std::array::from_fn(|lane| helpers >> lane & 1 != 0);
                 batch.file.set(batch.slot(*dst), vector, lanes);
+            }
+        }
+        Statement::Clock { dst } => {
+            let time = host_time();
+            for vector in 0..batch.file.width() {
+                batch.file.set(batch.slot(*dst), vector, [time; 16]);
             }
         }
         Statement::Load {

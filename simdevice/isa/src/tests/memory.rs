@@ -3,6 +3,7 @@
 use std::sync::{Arc, Mutex};
 
 use crate::builder::Builder;
+use crate::clock::host_time;
 use crate::ir::{
     Address, AtomicOp, Binding, Dimension, Format, ImageRead, ImageShape, ImageWrite, Program,
     Rate, Reg, Space, Statement, Type,
@@ -582,4 +583,42 @@ fn image_instructions_ask_once_for_each_image(case: &Case) {
         [0, 1, 2, 3].map(|slot| machine.output(slot, 7)),
         [7, 1, 8, 0b1000_1000]
     );
+}
+
+#[gaurast_runner::test(each = gaurast_runner::simd_levels())]
+fn clocks_are_read_where_they_stand(case: &Case) {
+    let (name, level) = level(case);
+    let mut b = Builder::new();
+    let times: Vec<_> = (0..2).map(|slot| b.output(slot, Type::B64)).collect();
+    let first = b.clock();
+    b.assign(times[0], first);
+    let second = b.clock();
+    b.assign(times[1], second);
+    let lane = b.lane_index();
+    let three = b.u32(3);
+    let is_low = b.compute(Op::ULt, &[lane, three]);
+    b.begin_if(is_low);
+    let third = b.clock();
+    b.assign(times[1], third);
+    b.end();
+    let program = b.finish().expect("a valid program");
+    let mut machine = machine(&program, level, LANES);
+    let before = host_time();
+    machine
+        .run(
+            &LaneMask::first(LANES),
+            &LaneMask::none(),
+            &Resources::default(),
+            Watchdog::default(),
+        )
+        .expect("it ends");
+    let after = host_time();
+    let [first, second, third] =
+        [(0, 5), (1, 5), (1, 2)].map(|(slot, lane)| machine.output64(slot, lane));
+    let times = [before, first, second, third, after];
+    assert!(times.is_sorted(), "{times:?} at {name}");
+    assert!(before < after);
+    for lane in 0..LANES {
+        assert_eq!(machine.output64(0, lane), first, "lane {lane} at {name}");
+    }
 }

@@ -1,4 +1,5 @@
 use super::*;
+use crate::format::depth::{ordered, unordered};
 use crate::token_of;
 use devmem::dispatch;
 use fearless_simd::f32x16;
@@ -13,7 +14,7 @@ fn expected(format: Format, depth: f32) -> u32 {
     match format {
         Format::D16Unorm => u32::from_le_bytes([a, b, 0, 0]),
         Format::X8D24UnormPack32 => u32::from_le_bytes([a, b, c, 0]),
-        _ => u32::from_le_bytes([a, b, c, d]),
+        _ => ordered(u32::from_le_bytes([a, b, c, d])),
     }
 }
 
@@ -53,7 +54,7 @@ fn depths_become_the_nearest_numbers_of_their_format(case: &Case) {
             for (depth, found) in chunk.iter().zip(codes) {
                 let inside = if *depth > 0.0 { depth.min(1.0) } else { 0.0 };
                 assert_eq!(found, expected(format, inside), "{format:?} {depth}");
-                assert_eq!(found, code.encode_one(*depth), "{format:?} {depth}");
+                assert_eq!(found, code.encode_one(inside), "{format:?} {depth}");
             }
         }
     }
@@ -67,6 +68,42 @@ fn depth_is_clamped_to_the_viewports_range() {
         DepthEncoding::Float.encode(simd, f32x16::simd_from(simd, depths), (0.25, 0.5)).into()
     });
     for (depth, code) in depths.into_iter().zip(codes) {
-        assert_eq!(f32::from_bits(code), depth.clamp(0.25, 0.5));
+        assert_eq!(DepthEncoding::Float.decode(code), depth.clamp(0.25, 0.5));
+    }
+}
+
+#[gaurast_runner::test(each = simd_levels())]
+fn codes_of_floats_are_ordered_as_the_depths(case: &Case) {
+    let level = token_of(case);
+    let depths: [f32; 16] = [
+        f32::NEG_INFINITY,
+        f32::MIN,
+        -2.0,
+        -1.0,
+        -0.5,
+        -f32::MIN_POSITIVE,
+        -f32::from_bits(1),
+        0.0,
+        f32::from_bits(1),
+        f32::MIN_POSITIVE,
+        0.5,
+        1.0,
+        1.5,
+        1e9,
+        f32::MAX,
+        f32::INFINITY,
+    ];
+    let float = DepthEncoding::Float;
+    let all = (f32::NEG_INFINITY, f32::INFINITY);
+    let codes: [u32; 16] =
+        dispatch!(level, simd => float.encode(simd, f32x16::simd_from(simd, depths), all).into());
+    assert!(codes.is_sorted_by(|a, b| a < b), "{codes:?}");
+    for (depth, code) in depths.into_iter().zip(codes) {
+        assert_eq!(float.encode_one(depth), code, "{depth}");
+        assert_eq!(float.decode(code).to_bits(), depth.to_bits());
+    }
+    assert_eq!(float.encode_one(-0.0), float.encode_one(0.0));
+    for bits in [1 << 31, f32::NAN.to_bits(), u32::MAX] {
+        assert_eq!(unordered(ordered(bits)), bits, "an image may hold any bits");
     }
 }

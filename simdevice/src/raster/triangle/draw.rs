@@ -3,6 +3,7 @@
 
 use super::batch::Samples;
 use super::setup::Needs;
+use crate::format::depth::DepthEncoding;
 use crate::geometry::PrimitiveDraw;
 use crate::program::bindings::BoundResources;
 use crate::program::fragment::{FragmentStage, Interface};
@@ -147,7 +148,7 @@ impl<'a> TriangleTileDraw<'a> {
             counts_late: effects.counts_late,
             samples,
             area,
-            ranges: depth_ranges(state),
+            ranges: depth_ranges(state, tests.code),
             needs: interface.map_or_else(Needs::default, |interface| {
                 needs(interface, path, optimizations)
             }),
@@ -223,14 +224,20 @@ fn whole_tile_path(interface: &Interface, colors: &[Option<ColorOutput>], may_hi
     }
 }
 
-/// The range to which depth is clamped in each viewport.
-fn depth_ranges(state: &DrawState) -> Vec<(f32, f32)> {
+/// The range to which depth is clamped in each viewport (Vulkan 1.3, "Depth Clamping and Range Adjustment").
+fn depth_ranges(state: &DrawState, code: DepthEncoding) -> Vec<(f32, f32)> {
+    let (least, greatest) = if state.unrestricted_depth && code == DepthEncoding::Float {
+        (f32::NEG_INFINITY, f32::INFINITY)
+    } else {
+        (0.0, 1.0)
+    };
     let range = |viewport: &Viewport| {
         let (a, b) = (viewport.min_depth, viewport.max_depth);
         if state.depth_clamp {
-            (a.min(b).clamp(0.0, 1.0), a.max(b).clamp(0.0, 1.0))
+            let inside = |depth: f32| depth.clamp(least, greatest);
+            (inside(a.min(b)), inside(a.max(b)))
         } else {
-            (0.0, 1.0)
+            (least, greatest)
         }
     };
     state.viewports.iter().map(range).collect()

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::format::Aspect;
+use crate::format::depth::{DepthEncoding, ordered, unordered};
 use crate::image::{Image, ImageDesc, ImageKind, ImageView};
 use crate::packet::*;
 use crate::pass::{Pass, PassDraw};
@@ -246,7 +247,7 @@ impl Scene {
             let depth = match self.depth.plane(Aspect::Depth).unwrap() {
                 Format::D16Unorm => f64::from(stored) / 65535.0,
                 Format::X8D24UnormPack32 => f64::from(stored) / 16_777_215.0,
-                _ => f32::from_bits(stored).into(),
+                _ => f32::from_bits(unordered(stored)).into(),
             };
             if tests
                 .bounds
@@ -335,6 +336,7 @@ impl Scene {
     /// Draws it on a device.
     fn render(&self, device: &Device) -> Picture {
         let (color, depth) = (self.image(self.color), self.image(self.depth));
+        let is_float = self.depth.plane(Aspect::Depth) == Some(Format::D32Sfloat);
         let before = &self.before;
         let write = |view: &ImageView, aspect, texel: &dyn Fn(usize) -> Vec<u8>| {
             self.each(view, aspect, |at, layout, place, size| {
@@ -346,7 +348,9 @@ impl Scene {
             self.color.encode(before.color[at]).to_vec()
         });
         write(&depth, Aspect::Depth, &|at| {
-            before.depth[at].to_le_bytes().to_vec()
+            let code = before.depth[at];
+            let word = if is_float { unordered(code) } else { code };
+            word.to_le_bytes().to_vec()
         });
         write(&depth, Aspect::Stencil, &|at| vec![before.stencil[at]]);
         let attachment = |view: &ImageView| Attachment {
@@ -381,10 +385,13 @@ impl Scene {
         };
         let word = |bytes: Vec<u8>| u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
         let colors = read(&color, Aspect::Color).into_iter();
+        let depths = read(&depth, Aspect::Depth).into_iter().map(word);
         let stencils = read(&depth, Aspect::Stencil).into_iter();
         Picture {
             color: colors.map(|bytes| self.color.decode(&bytes)).collect(),
-            depth: read(&depth, Aspect::Depth).into_iter().map(word).collect(),
+            depth: depths
+                .map(|word| if is_float { ordered(word) } else { word })
+                .collect(),
             stencil: if has_stencil {
                 stencils.map(|bytes| bytes[0]).collect()
             } else {
@@ -470,7 +477,8 @@ fn hidden_work(
     let mut tile = Box::new(GaussianTile::default());
     let mut counters = Counters::default();
     let lanes = [u32::from(u16::MAX); BLOCKS];
-    tile.ranges.set(compare, &stored.map(f32::to_bits), &lanes);
+    let codes = stored.map(|depth| DepthEncoding::Float.encode_one(depth));
+    tile.ranges.set(compare, &codes, &lanes);
     tile.run::<TEST_DEPTH>(&draw, device.level(), [2, 2], 0, &lanes, &mut counters);
     let pairs = counters.get(Counter::TilePairsEvaluated);
     assert!(pairs <= draw.sorted.tiles.list(2, 2).len() as u64);
