@@ -1,4 +1,4 @@
-//! Instances, with their version, extensions and debug messengers, and the physical device of each instance.
+//! Instances, with their version, extensions and listeners to messages, and the physical device of each instance.
 //!
 //! The version is 1.3: every core command's name is found. The version claims no conformance (`conformanceVersion` is
 //! 0.0.0.0): features that 1.3 requires and that don't work yet are reported as false and refused by `vkCreateDevice`,
@@ -9,11 +9,12 @@ use crate::abi::error::Error;
 use crate::abi::handle::{self, Reporter, objects};
 use crate::abi::valid::{self, Structures};
 use crate::convert;
+use crate::listeners::{DebugMessenger, DebugReportCallback, Listeners, Message, ReportOrigin};
 use crate::registry::extensions::{DEVICE, Extension, INSTANCE};
 use crate::window;
 use ash::vk;
-use std::ffi::{CStr, CString, c_void};
-use std::sync::{Arc, LazyLock, PoisonError, RwLock, Weak};
+use std::ffi::CStr;
+use std::sync::{Arc, LazyLock, Weak};
 
 /// The version of the instance and of its device.
 pub(crate) const API_VERSION: u32 = vk::HEADER_VERSION_COMPLETE;
@@ -71,7 +72,8 @@ pub(crate) struct Instance {
     api_version: u32,
     extensions: Vec<&'static CStr>,
     physical_device: vk::PhysicalDevice,
-    messengers: RwLock<Vec<Arc<DebugMessenger>>>,
+    messengers: Listeners<DebugMessenger>,
+    report_callbacks: Listeners<DebugReportCallback>,
 }
 
 objects! {
@@ -86,6 +88,7 @@ objects! {
         }
     };
     vk::DebugUtilsMessengerEXT => DebugMessenger;
+    vk::DebugReportCallbackEXT => DebugReportCallback;
 }
 
 /// The version and the extensions that decide which commands are found.
@@ -114,7 +117,8 @@ impl Instance {
             api_version,
             extensions,
             physical_device: handle::create(Arc::new(PhysicalDevice::new(this.clone()))),
-            messengers: RwLock::default(),
+            messengers: Listeners::default(),
+            report_callbacks: Listeners::default(),
         }))
     }
 
@@ -132,33 +136,7 @@ impl Instance {
         }
     }
 
-    /// Registers a messenger.
-    pub(crate) fn add_messenger(&self, messenger: Arc<DebugMessenger>) {
-        let mut messengers = self
-            .messengers
-            .write()
-            .unwrap_or_else(PoisonError::into_inner);
-        messengers.push(messenger);
-    }
-
-    /// Removes a messenger.
-    pub(crate) fn remove_messenger(&self, messenger: &Arc<DebugMessenger>) {
-        let mut messengers = self
-            .messengers
-            .write()
-            .unwrap_or_else(PoisonError::into_inner);
-        messengers.retain(|other| !Arc::ptr_eq(other, messenger));
-    }
-
-    /// The registered messengers. A callback may use Vulkan, so no lock is held while it runs.
-    pub(crate) fn messengers(&self) -> Vec<Arc<DebugMessenger>> {
-        self.messengers
-            .read()
-            .unwrap_or_else(PoisonError::into_inner)
-            .clone()
-    }
-
-    /// Sends a message of the driver to the messengers that accept it.
+    /// Sends a message of the driver to the listeners that accept it.
     pub(crate) fn report(
         &self,
         severity: vk::DebugUtilsMessageSeverityFlagsEXT,
@@ -166,17 +144,22 @@ impl Instance {
         id: &str,
         message: &str,
     ) {
-        for messenger in self.messengers() {
-            messenger.report(severity, types, id, message);
+        self.send(&Message::new(severity, types, id, message));
+    }
+
+    fn send(&self, message: &Message) {
+        for messenger in self.messengers.all() {
+            messenger.report(message);
+        }
+        for callback in self.report_callbacks.all() {
+            callback.report(message);
         }
     }
 }
 
 impl Reporter for Instance {
     fn report_error(&self, command: &str, error: &Error) {
-        for messenger in self.messengers() {
-            messenger.report_error(command, error);
-        }
+        self.send(&Message::of_error(command, error));
     }
 }
 
@@ -210,86 +193,6 @@ impl PhysicalDevice {
             raw: 0,
         })
     }
-}
-
-/// A callback with its filter.
-pub(crate) struct DebugMessenger {
-    severities: vk::DebugUtilsMessageSeverityFlagsEXT,
-    types: vk::DebugUtilsMessageTypeFlagsEXT,
-    callback: vk::PFN_vkDebugUtilsMessengerCallbackEXT,
-    user_data: *mut c_void,
-}
-
-// SAFETY: `user_data` is the application's and only handed back to its callback, which Vulkan may call on any thread.
-unsafe impl Send for DebugMessenger {}
-// SAFETY: as for `Send`.
-unsafe impl Sync for DebugMessenger {}
-
-impl DebugMessenger {
-    /// The messenger that the application describes.
-    pub(crate) fn new(info: &vk::DebugUtilsMessengerCreateInfoEXT<'_>) -> Self {
-        Self {
-            severities: info.message_severity,
-            types: info.message_type,
-            callback: info.pfn_user_callback,
-            user_data: info.p_user_data,
-        }
-    }
-
-    /// Calls the application's callback if its filter accepts the message.
-    ///
-    /// # Safety
-    /// `data` and what it points at are valid; the application keeps its callback callable while it is registered.
-    pub(crate) unsafe fn submit(
-        &self,
-        severity: vk::DebugUtilsMessageSeverityFlagsEXT,
-        types: vk::DebugUtilsMessageTypeFlagsEXT,
-        data: &vk::DebugUtilsMessengerCallbackDataEXT<'_>,
-    ) {
-        let wanted = self.severities.contains(severity) && self.types.intersects(types);
-        if let Some(callback) = self.callback.filter(|_| wanted) {
-            // SAFETY: the caller's promise. The callback's result, which asks to abort the call, is meant for layers.
-            unsafe { callback(severity, types, data, self.user_data) };
-        }
-    }
-
-    /// Reports an error of the Vulkan command `command`.
-    pub(crate) fn report_error(&self, command: &str, error: &Error) {
-        let types = if error.is_usage() {
-            vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION
-        } else {
-            vk::DebugUtilsMessageTypeFlagsEXT::GENERAL
-        };
-        self.report(
-            vk::DebugUtilsMessageSeverityFlagsEXT::ERROR,
-            types,
-            error.message_id(),
-            &format!("{command}: {error}"),
-        );
-    }
-
-    /// As [`DebugMessenger::submit`], with a message of the driver.
-    pub(crate) fn report(
-        &self,
-        severity: vk::DebugUtilsMessageSeverityFlagsEXT,
-        types: vk::DebugUtilsMessageTypeFlagsEXT,
-        id: &str,
-        message: &str,
-    ) {
-        let id = c_string(id);
-        let message = c_string(message);
-        let data = vk::DebugUtilsMessengerCallbackDataEXT::default()
-            .message_id_name(&id)
-            .message(&message);
-        // SAFETY: the strings outlive the call; the messenger is registered, so its callback is callable.
-        unsafe { self.submit(severity, types, &data) };
-    }
-}
-
-/// The text up to its first zero byte.
-fn c_string(text: &str) -> CString {
-    let end = text.find('\0').unwrap_or(text.len());
-    CString::new(&text[..end]).unwrap_or_default()
 }
 
 /// Creates an instance from a valid creation info.
@@ -343,12 +246,16 @@ pub(crate) unsafe fn create_instance(
 ) -> Result<Arc<Instance>, Error> {
     // SAFETY: the caller's promise.
     unsafe { new_instance(create_info) }.inspect_err(|error| {
-        // Messengers in the chain receive errors of the creation of the instance itself.
+        // Listeners in the chain receive errors of the creation of the instance itself.
+        let message = Message::of_error("vkCreateInstance", error);
         // SAFETY: the caller's promise.
-        let messengers = unsafe { valid::chain(create_info.p_next) }
-            .filter_map(valid::cast::<vk::DebugUtilsMessengerCreateInfoEXT<'_>>);
-        for messenger in messengers {
-            DebugMessenger::new(messenger).report_error("vkCreateInstance", error);
+        for structure in unsafe { valid::chain(create_info.p_next) } {
+            if let Some(info) = valid::cast::<vk::DebugUtilsMessengerCreateInfoEXT<'_>>(structure) {
+                DebugMessenger::new(info).report(&message);
+            }
+            if let Some(info) = valid::cast::<vk::DebugReportCallbackCreateInfoEXT<'_>>(structure) {
+                DebugReportCallback::new(info).report(&message);
+            }
         }
     })
 }
@@ -378,7 +285,7 @@ pub(crate) fn create_debug_utils_messenger(
     create_info: &vk::DebugUtilsMessengerCreateInfoEXT<'_>,
 ) -> Result<Arc<DebugMessenger>, Error> {
     let created = Arc::new(DebugMessenger::new(create_info));
-    instance.add_messenger(Arc::clone(&created));
+    instance.messengers.add(Arc::clone(&created));
     Ok(created)
 }
 
@@ -388,7 +295,7 @@ pub(crate) fn destroy_debug_utils_messenger(
     messenger: Option<Arc<DebugMessenger>>,
 ) -> Result<(), Error> {
     if let Some(messenger) = messenger {
-        instance.remove_messenger(&messenger);
+        instance.messengers.remove(&messenger);
     }
     Ok(())
 }
@@ -402,9 +309,56 @@ pub(crate) unsafe fn submit_debug_utils_message(
     message_types: vk::DebugUtilsMessageTypeFlagsEXT,
     callback_data: &vk::DebugUtilsMessengerCallbackDataEXT<'_>,
 ) -> Result<(), Error> {
-    for messenger in instance.messengers() {
+    for messenger in instance.messengers.all() {
         // SAFETY: the caller's promise.
         unsafe { messenger.submit(message_severity, message_types, callback_data) };
+    }
+    Ok(())
+}
+
+#[doc(alias = "vkCreateDebugReportCallbackEXT")]
+pub(crate) fn create_debug_report_callback(
+    instance: &Instance,
+    create_info: &vk::DebugReportCallbackCreateInfoEXT<'_>,
+) -> Result<Arc<DebugReportCallback>, Error> {
+    let created = Arc::new(DebugReportCallback::new(create_info));
+    instance.report_callbacks.add(Arc::clone(&created));
+    Ok(created)
+}
+
+#[doc(alias = "vkDestroyDebugReportCallbackEXT")]
+pub(crate) fn destroy_debug_report_callback(
+    instance: &Instance,
+    callback: Option<Arc<DebugReportCallback>>,
+) -> Result<(), Error> {
+    if let Some(callback) = callback {
+        instance.report_callbacks.remove(&callback);
+    }
+    Ok(())
+}
+
+#[doc(alias = "vkDebugReportMessageEXT")]
+#[expect(clippy::too_many_arguments, reason = "Vulkan's signature")]
+pub(crate) fn debug_report_message(
+    instance: &Instance,
+    flags: vk::DebugReportFlagsEXT,
+    object_type: vk::DebugReportObjectTypeEXT,
+    object: u64,
+    location: usize,
+    message_code: i32,
+    layer_prefix: &CStr,
+    message: &CStr,
+) -> Result<(), Error> {
+    let origin = ReportOrigin {
+        object_type,
+        object,
+        location,
+        message_code,
+        layer_prefix,
+    };
+    for callback in instance.report_callbacks.all() {
+        // SAFETY: the callback is registered, so it is callable.
+        unsafe { callback.submit(flags, origin, message) };
     }
     Ok(())
 }

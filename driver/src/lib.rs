@@ -16,6 +16,7 @@ mod device_addresses;
 mod device_sync;
 mod dispatch;
 mod instance;
+mod listeners;
 pub mod loader;
 mod physical_device;
 mod pipeline;

@@ -8,7 +8,8 @@ use gaurast::vk::{
     PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST,
 };
 use gaurast_testkit::{Message, Messages};
-use std::ffi::CStr;
+use std::ffi::{CStr, c_char, c_void};
+use std::sync::Mutex;
 
 #[gaurast_runner::test]
 fn a_device_is_created_used_and_destroyed() {
@@ -172,6 +173,131 @@ fn an_instance_refuses_what_it_lacks_and_says_so() {
     // SAFETY: the creation info is valid.
     let error = unsafe { entry.create_instance(&info, None) }.err();
     assert_eq!(error, Some(vk::Result::ERROR_LAYER_NOT_PRESENT));
+}
+
+/// A report that a callback of `VK_EXT_debug_report` received: its flags, object, location, code, prefix and text.
+type Report = (vk::DebugReportFlagsEXT, u64, usize, i32, String, String);
+
+unsafe extern "system" fn hear_report(
+    flags: vk::DebugReportFlagsEXT,
+    _object_type: vk::DebugReportObjectTypeEXT,
+    object: u64,
+    location: usize,
+    message_code: i32,
+    layer_prefix: *const c_char,
+    message: *const c_char,
+    user_data: *mut c_void,
+) -> vk::Bool32 {
+    // SAFETY: the caller passes valid strings, and the user data of `listening`.
+    let (texts, heard) = unsafe {
+        let text = |text| CStr::from_ptr(text).to_string_lossy().into_owned();
+        let texts = [layer_prefix, message].map(text);
+        (texts, &*user_data.cast::<Mutex<Vec<Report>>>())
+    };
+    let [prefix, text] = texts;
+    let mut heard = heard.lock().unwrap();
+    heard.push((flags, object, location, message_code, prefix, text));
+    vk::FALSE
+}
+
+/// Creation info of a callback that stores reports of these kinds.
+fn listening(
+    heard: &Mutex<Vec<Report>>,
+    flags: vk::DebugReportFlagsEXT,
+) -> vk::DebugReportCallbackCreateInfoEXT<'_> {
+    vk::DebugReportCallbackCreateInfoEXT::default()
+        .flags(flags)
+        .pfn_callback(Some(hear_report))
+        .user_data(std::ptr::from_ref(heard).cast_mut().cast())
+}
+
+#[gaurast_runner::test]
+fn report_callbacks_hear_the_driver_and_the_application() {
+    use ash::ext::debug_report;
+    use vk::DebugReportFlagsEXT as Flags;
+    let (errors, all) = (Mutex::default(), Mutex::default());
+    let context = Context::embedded(&[debug_report::NAME]);
+    let reports = debug_report::Instance::new(&context.entry, &context.instance);
+    // ash's own methods are deprecated, as the extension is.
+    let (reports, instance) = (reports.fp(), context.instance.handle());
+    let create = |heard, flags| {
+        let mut callback = vk::DebugReportCallbackEXT::null();
+        let info = listening(heard, flags);
+        // SAFETY: what is heard outlives the callback.
+        let result = unsafe {
+            (reports.create_debug_report_callback_ext)(
+                instance,
+                &raw const info,
+                std::ptr::null(),
+                &raw mut callback,
+            )
+        };
+        assert_eq!(result, vk::Result::SUCCESS);
+        callback
+    };
+    // SAFETY: the callback is null, or live and not used again.
+    let destroy = |callback| unsafe {
+        (reports.destroy_debug_report_callback_ext)(instance, callback, std::ptr::null());
+    };
+    let taken = |heard: &Mutex<Vec<Report>>| std::mem::take(&mut *heard.lock().unwrap());
+    let refuse = || {
+        let device = context.device(&[c"VK_EXT_mesh_shader"], &mut Default::default());
+        assert!(device.is_err());
+    };
+
+    let of_errors = create(&errors, Flags::ERROR);
+    let everything = Flags::ERROR | Flags::WARNING | Flags::INFORMATION | Flags::DEBUG;
+    let of_all = create(&all, everything);
+    refuse();
+    let heard = taken(&errors);
+    assert_eq!(heard, taken(&all));
+    let (flags, _, _, _, prefix, text) = &heard[0];
+    assert_eq!((*flags, prefix.as_str()), (Flags::ERROR, "GAURAST-error"));
+    assert!(
+        text.contains("vkCreateDevice") && text.contains("VK_EXT_mesh_shader"),
+        "{text}"
+    );
+
+    // SAFETY: the strings are valid.
+    unsafe {
+        (reports.debug_report_message_ext)(
+            instance,
+            Flags::WARNING,
+            vk::DebugReportObjectTypeEXT::BUFFER,
+            7,
+            8,
+            -9,
+            c"test".as_ptr(),
+            c"hello".as_ptr(),
+        );
+    }
+    let sent = (
+        Flags::WARNING,
+        7,
+        8,
+        -9,
+        "test".to_owned(),
+        "hello".to_owned(),
+    );
+    assert_eq!((taken(&errors), taken(&all)), (vec![], vec![sent]));
+
+    destroy(of_errors);
+    destroy(vk::DebugReportCallbackEXT::null());
+    refuse();
+    assert!(taken(&errors).is_empty() && !taken(&all).is_empty());
+    destroy(of_all);
+    refuse();
+    assert!(taken(&all).is_empty());
+
+    let mut callback = listening(&errors, Flags::ERROR);
+    let names = [c"VK_KHR_xcb_surface".as_ptr()];
+    let info = vk::InstanceCreateInfo::default()
+        .enabled_extension_names(&names)
+        .push_next(&mut callback);
+    // SAFETY: the creation info is valid.
+    let error = unsafe { context.entry.create_instance(&info, None) }.err();
+    assert_eq!(error, Some(vk::Result::ERROR_EXTENSION_NOT_PRESENT));
+    assert!(taken(&errors)[0].5.contains("VK_KHR_xcb_surface"));
 }
 
 #[gaurast_runner::test]

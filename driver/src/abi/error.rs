@@ -4,7 +4,7 @@ use crate::window::WindowLost;
 use ash::vk;
 use std::borrow::Cow;
 
-/// The reason that a command failed. The message goes to `log` and to the instance's debug messengers; the application
+/// The reason that a command failed. The message goes to `log` and to the instance's listeners; the application
 /// receives [`Error::result`].
 #[derive(Clone, Debug, thiserror::Error)]
 pub(crate) enum Error {

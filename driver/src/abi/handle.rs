@@ -268,7 +268,8 @@ pub fn live_handles() -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::instance::{DebugMessenger, Instance};
+    use crate::instance::Instance;
+    use crate::listeners::DebugMessenger;
 
     fn messenger() -> Arc<DebugMessenger> {
         Arc::new(DebugMessenger::new(

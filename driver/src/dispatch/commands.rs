@@ -275,6 +275,11 @@ static ROWS: &[Command] = rows! {
         vkCmdBeginConditionalRenderingEXT: vk::PFN_vkCmdBeginConditionalRenderingEXT = vkCmdBeginConditionalRenderingEXT;
         vkCmdEndConditionalRenderingEXT: vk::PFN_vkCmdEndConditionalRenderingEXT = vkCmdEndConditionalRenderingEXT;
     }
+    Instance, InstanceExtension(&[c"VK_EXT_debug_report"]) => {
+        vkCreateDebugReportCallbackEXT: vk::PFN_vkCreateDebugReportCallbackEXT = vkCreateDebugReportCallbackEXT;
+        vkDestroyDebugReportCallbackEXT: vk::PFN_vkDestroyDebugReportCallbackEXT = vkDestroyDebugReportCallbackEXT;
+        vkDebugReportMessageEXT: vk::PFN_vkDebugReportMessageEXT = vkDebugReportMessageEXT;
+    }
     Device, InstanceExtension(&[c"VK_EXT_debug_utils"]) => {
         vkSetDebugUtilsObjectNameEXT: vk::PFN_vkSetDebugUtilsObjectNameEXT = vkSetDebugUtilsObjectNameEXT;
         vkSetDebugUtilsObjectTagEXT: vk::PFN_vkSetDebugUtilsObjectTagEXT = vkSetDebugUtilsObjectTagEXT;
@@ -4550,6 +4555,72 @@ unsafe extern "system" fn vkCmdEndConditionalRenderingEXT(command_buffer: vk::Co
                 command_buffer,
                 "vkCmdEndConditionalRenderingEXT",
                 |recorder| crate::command::conditional::cmd_end_conditional_rendering(recorder),
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkCreateDebugReportCallbackEXT(
+    instance: vk::Instance,
+    p_create_info: *const vk::DebugReportCallbackCreateInfoEXT<'_>,
+    _: *const vk::AllocationCallbacks<'_>,
+    p_callback: *mut vk::DebugReportCallbackEXT,
+) -> vk::Result {
+    guard(instance, "vkCreateDebugReportCallbackEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_callback,
+                handle::create(crate::instance::create_debug_report_callback(
+                    handle::get(instance)?,
+                    valid::input(p_create_info)?,
+                )?),
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkDestroyDebugReportCallbackEXT(
+    instance: vk::Instance,
+    callback: vk::DebugReportCallbackEXT,
+    _: *const vk::AllocationCallbacks<'_>,
+) {
+    guard(instance, "vkDestroyDebugReportCallbackEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::instance::destroy_debug_report_callback(
+                handle::get(instance)?,
+                handle::destroy(callback)?,
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkDebugReportMessageEXT(
+    instance: vk::Instance,
+    flags: vk::DebugReportFlagsEXT,
+    object_type: vk::DebugReportObjectTypeEXT,
+    object: u64,
+    location: usize,
+    message_code: i32,
+    p_layer_prefix: *const std::ffi::c_char,
+    p_message: *const std::ffi::c_char,
+) {
+    guard(instance, "vkDebugReportMessageEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::instance::debug_report_message(
+                handle::get(instance)?,
+                flags,
+                object_type,
+                object,
+                location,
+                message_code,
+                valid::string(p_layer_prefix).ok_or(Error::NullPointer {
+                    what: "p_layer_prefix",
+                })?,
+                valid::string(p_message).ok_or(Error::NullPointer { what: "p_message" })?,
             )
         }
     })

@@ -98,6 +98,9 @@ fn every_command_of_an_advertised_extension_is_there() {
     let mut names = names_loaded(|f| ash::ext::debug_utils::InstanceFn::load(f));
     names.extend(names_loaded(|f| ash::ext::debug_utils::DeviceFn::load(f)));
     names.extend(names_loaded(|f| {
+        ash::ext::debug_report::InstanceFn::load(f)
+    }));
+    names.extend(names_loaded(|f| {
         ash::khr::get_physical_device_properties2::InstanceFn::load(f)
     }));
     names.extend(names_loaded(|f| {
