@@ -158,7 +158,7 @@ fn statistics_count_patches_and_primitives() {
         commands.pass(&target, &Pass::default(), || {
             // SAFETY: see the crate.
             unsafe {
-                device.cmd_begin_query(commands.raw, pool, 0, vk::QueryControlFlags::empty())
+                device.cmd_begin_query(commands.raw, pool, 0, vk::QueryControlFlags::empty());
             };
             commands.bind(&pipeline);
             commands.vertices(&vertices);

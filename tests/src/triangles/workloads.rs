@@ -6,13 +6,14 @@ use rand::Rng;
 
 use super::models::{Model, Ready};
 use super::{Missing, shapes};
+use gaurast_testkit::shader::Stage;
 use gaurast_testkit::{
     Bindings, Buffer, Gpu, Image, ImageOptions, Pass, Pipeline, PipelineOptions, Recorded,
     Resource, Sampler, Target, TargetOptions, Vertex, blend, depth_test,
 };
 
 /// The names of all workloads.
-pub const NAMES: [&str; 9] = [
+pub const NAMES: [&str; 11] = [
     "fill",
     "small triangles",
     "trilinear texture",
@@ -21,6 +22,8 @@ pub const NAMES: [&str; 9] = [
     "vertices",
     "blended layers",
     "four samples",
+    "geometry shader",
+    "tessellation",
     "african head 1080p",
 ];
 
@@ -88,6 +91,28 @@ impl Workload {
             "four samples" => {
                 let target = TargetOptions { samples: 4, ..deep };
                 Self::of(gpu, &target, &tested, &small(count(100_000), size))
+            }
+            "geometry shader" => {
+                let options = PipelineOptions {
+                    topology: vk::PrimitiveTopology::POINT_LIST,
+                    between: vec![(Stage::Geometry, QUAD_OF_POINT)],
+                    ..PipelineOptions::default()
+                };
+                let points = small(count(200_000), size);
+                let points: Vec<_> = points.into_iter().step_by(3).collect();
+                Self::of(gpu, &plain, &options, &points)
+            }
+            "tessellation" => {
+                let options = PipelineOptions {
+                    topology: vk::PrimitiveTopology::PATCH_LIST,
+                    patch_vertices: 4,
+                    between: vec![
+                        (Stage::TessellationControl, LEVEL_OF_PATCH),
+                        (Stage::TessellationEvaluation, POINT_OF_PATCH),
+                    ],
+                    ..tested
+                };
+                Self::of(gpu, &deep, &options, &patches(count(500)))
             }
             "african head 1080p" => Self::model(gpu, &deep)?,
             _ => panic!("no workload is called {name}"),
@@ -231,6 +256,60 @@ impl Workload {
             _things: Box::new(ready),
         })
     }
+}
+
+/// A geometry shader that makes a quad of a few pixels of each point.
+const QUAD_OF_POINT: &str = "
+    layout(points) in;
+    layout(triangle_strip, max_vertices = 4) out;
+    layout(location = 0) in vec4 color[];
+    layout(location = 0) out vec4 v_color;
+    void main() {
+        for (int corner = 0; corner < 4; corner++) {
+            vec2 offset = vec2(corner & 1, corner >> 1) * 0.004;
+            gl_Position = gl_in[0].gl_Position + vec4(offset, 0.0, 0.0);
+            v_color = color[0];
+            EmitVertex();
+        }
+    }";
+
+/// A control shader that divides patches into 32 x 32 parts.
+const LEVEL_OF_PATCH: &str = "
+    layout(vertices = 4) out;
+    layout(location = 0) in vec4 color[];
+    layout(location = 0) out vec4 c_color[];
+    void main() {
+        gl_out[gl_InvocationID].gl_Position = gl_in[gl_InvocationID].gl_Position;
+        c_color[gl_InvocationID] = color[gl_InvocationID];
+        gl_TessLevelOuter[gl_InvocationID] = 32.0;
+        gl_TessLevelInner[gl_InvocationID & 1] = 32.0;
+    }";
+
+/// An evaluation shader that bends a patch.
+const POINT_OF_PATCH: &str = "
+    layout(quads) in;
+    layout(location = 0) in vec4 c_color[];
+    layout(location = 0) out vec4 v_color;
+    void main() {
+        vec4 low = mix(gl_in[0].gl_Position, gl_in[1].gl_Position, gl_TessCoord.x);
+        vec4 high = mix(gl_in[2].gl_Position, gl_in[3].gl_Position, gl_TessCoord.x);
+        gl_Position = mix(low, high, gl_TessCoord.y);
+        gl_Position.xy += 0.01 * sin(10.0 * gl_TessCoord.yx);
+        v_color = vec4(gl_TessCoord.xy, c_color[0].b, 1.0);
+    }";
+
+/// Square patches, each with four vertices.
+fn patches(count: usize) -> Vec<Vertex> {
+    let mut rng = shapes::rng(303);
+    let patch = |_| {
+        let [x, y] = [0; 2].map(|_| rng.random_range(-1.0..0.8f32));
+        let z = rng.random_range(0.0..1.0);
+        [[0.0, 0.0], [0.2, 0.0], [0.0, 0.2], [0.2, 0.2]].map(|[u, v]: [f32; 2]| Vertex {
+            position: [x + u, y + v, z, 1.0],
+            color: [u, v, z, 1.0],
+        })
+    };
+    (0..count).flat_map(patch).collect()
 }
 
 /// One triangle that covers half of the target.
