@@ -64,6 +64,7 @@ fn stages_that_do_not_fit_are_refused() {
         vk::PrimitiveTopology::TRIANGLE_LIST,
         vk::PrimitiveTopology::PATCH_LIST,
     );
+    let strips = vk::PrimitiveTopology::LINE_STRIP;
     let both = [control(), evaluation("triangles")];
     let lines = [control(), evaluation("isolines"), geometry()];
     let cases = [
@@ -73,6 +74,7 @@ fn stages_that_do_not_fit_are_refused() {
         (with(&[], patches, 3), "topology-00737"),
         (with(&both, patches, 33), "patchControlPoints-01214"),
         (with(&lines, patches, 3), "pStages-00739"),
+        (with(&lines[2..], strips, 0), "pStages-00738"),
     ];
     for (request, rule) in &cases {
         let refused = request.create(&gpu).map(drop);

@@ -12,6 +12,7 @@ use simdevice::program::interface::{
     GeometryPrograms, PrimitiveInput, PrimitiveProgram, TessellationPrograms, VertexMemory,
     VertexOutput, VertexValue,
 };
+use simdevice::state::Topology;
 use simdevice::tessellation::{self, Tessellation};
 
 /// The shaders of tessellation.
@@ -146,7 +147,6 @@ pub(super) fn geometry(
         count: count.unwrap_or(0) as u32,
         gives,
         outputs,
-        taken_corners: modes.input.map_or(0, taken_corners),
         corners: match modes.output {
             Some(OutputPrimitive::Points) => 1,
             Some(OutputPrimitive::LineStrip) => 2,
@@ -276,13 +276,32 @@ fn division([control, evaluation]: [PrimitiveModes; 2]) -> Tessellation {
     }
 }
 
-/// Refuses stages that don't fit each other.
+/// The primitives that a geometry stage takes of a topology; `None` for patches.
+fn primitives_of(topology: Topology) -> Option<InputPrimitive> {
+    match topology {
+        Topology::PointList => Some(InputPrimitive::Points),
+        Topology::LineList | Topology::LineStrip => Some(InputPrimitive::Lines),
+        Topology::LineListWithAdjacency | Topology::LineStripWithAdjacency => {
+            Some(InputPrimitive::LinesAdjacency)
+        }
+        Topology::TriangleList | Topology::TriangleStrip | Topology::TriangleFan => {
+            Some(InputPrimitive::Triangles)
+        }
+        Topology::TriangleListWithAdjacency | Topology::TriangleStripWithAdjacency => {
+            Some(InputPrimitive::TrianglesAdjacency)
+        }
+        Topology::PatchList { .. } => None,
+    }
+}
+
+/// Refuses stages that don't fit each other, or the topology, unless that is dynamic.
 ///
 /// # Errors
 /// [`Error::InvalidUsage`].
 pub(crate) fn check(
     tessellation: Option<&TessellationShaders>,
     geometry: Option<&Shader>,
+    topology: Option<Topology>,
 ) -> Result<(), Error> {
     if let Some(TessellationShaders {
         control,
@@ -312,6 +331,15 @@ pub(crate) fn check(
         ));
     }
     let taken = geometry.and_then(|shader| shader.interface.modes.input);
+    let given = topology.and_then(primitives_of);
+    if let (Some(taken), Some(given), None) = (taken, given, tessellation)
+        && taken != given
+    {
+        return Err(Error::usage(
+            "VUID-VkGraphicsPipelineCreateInfo-pStages-00738",
+            format!("the geometry shader takes {taken:?}, and the topology makes {given:?}"),
+        ));
+    }
     if let (Some(taken), Some(shaders)) = (taken, tessellation) {
         let modes = [
             shaders.control.interface.modes,

@@ -82,7 +82,11 @@ impl PrimitivePipeline {
         })?;
         let stages = Stages::find(device, info)?;
         let shaders = stages.translate(device, layout, fixed.draw.samples)?;
-        link_primitives::check(shaders.tessellation.as_ref(), shaders.geometry.as_ref())?;
+        link_primitives::check(
+            shaders.tessellation.as_ref(),
+            shaders.geometry.as_ref(),
+            (!info.is_dynamic(vk::DynamicState::PRIMITIVE_TOPOLOGY)).then_some(fixed.draw.topology),
+        )?;
         let locations = shaders.vertex.interface.locations_read();
         let is_dynamic = info.is_dynamic(vk::DynamicState::VERTEX_INPUT_EXT);
         let attributes = if is_dynamic {

@@ -133,8 +133,6 @@ pub struct GeometryPrograms {
     pub gives: VertexMemory,
     /// The meanings of the values that it gives; `None` is not used.
     pub outputs: Vec<Option<VertexOutput>>,
-    /// The number of corners of the primitives that it takes, with adjacent vertices: 1 to 6.
-    pub taken_corners: usize,
     /// The number of corners of the primitives that it gives: 1 to 3.
     pub corners: usize,
 }

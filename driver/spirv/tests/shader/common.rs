@@ -32,6 +32,9 @@ pub fn words_of(name: &str) -> Vec<u32> {
 pub fn stage_of(name: &str) -> Stage {
     match name.rsplit('.').next() {
         Some("vert") => Stage::Vertex,
+        Some("tesc") => Stage::TessellationControl,
+        Some("tese") => Stage::TessellationEvaluation,
+        Some("geom") => Stage::Geometry,
         Some("frag") => Stage::Fragment,
         _ => Stage::Compute,
     }

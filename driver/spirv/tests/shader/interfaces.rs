@@ -1,13 +1,15 @@
 //! Tests of the interfaces of translated shaders: inputs, outputs, descriptors, push constants; and of the entry point
 //! that spirv-reflect finds.
 
+use std::collections::HashSet;
 use std::sync::Arc;
 
 use crate::common::{folder, translated, words_of};
 use fearless_simd::Level;
 use gaurast_spirv::{
-    BuiltIn, DepthMode, DescriptorKind, InputSource, Interface, Interpolation, Module,
-    OutputTarget, Sampling, ScalarType, Specialization,
+    BuiltIn, DepthMode, DescriptorKind, Domain, InputPrimitive, InputSource, Interface,
+    Interpolation, Module, OutputPrimitive, OutputTarget, PrimitiveModes, Sampling, ScalarType,
+    Spacing, Specialization, VertexMemory,
 };
 use isa::Options as ExecOptions;
 use isa::machine::{Executable, LaneMask, Machine, Watchdog};
@@ -188,6 +190,94 @@ fn spirv_reflect_sees_the_same_entry_point() {
     assert_eq!(ours.len(), 1);
     assert_eq!(ours[0].0, theirs.get_entry_point_name());
     assert_eq!(theirs.get_shader_stage(), Flags::VERTEX);
+}
+
+/// The targets of a memory's scalars with their offsets and strides, in words.
+fn places(memory: &VertexMemory) -> Vec<(OutputTarget, u32, Option<u32>)> {
+    let words = |bytes| bytes / 4;
+    let scalars = memory.scalars.iter();
+    scalars
+        .map(|it| (it.target, words(it.offset), it.vertex_stride.map(words)))
+        .collect()
+}
+
+#[gaurast_runner::test]
+fn a_geometry_shader_stores_the_vertices_that_it_emits() {
+    let shader = translated("strips.geom", &Specialization::default()).interface;
+    let modes = PrimitiveModes {
+        input: Some(InputPrimitive::TrianglesAdjacency),
+        output: Some(OutputPrimitive::TriangleStrip),
+        output_vertices: Some(20),
+        invocations: Some(3),
+        ..PrimitiveModes::default()
+    };
+    assert_eq!(shader.modes, modes);
+    let exchange = &shader.exchange;
+    assert_eq!((exchange.groups, exchange.lanes), (128, 128));
+    let inputs = places(&exchange.inputs);
+    for (at, component) in [(location(0, 2), 3), (location(1, 1), 2)] {
+        let found = inputs.iter().find(|(target, ..)| *target == at);
+        assert_eq!(found.expect("an input").2, Some(component));
+    }
+    // A vertex is a word, the position, sizes and distances of the block, the layer, the colour and two values; what is
+    // never written is not named.
+    let outputs = places(&exchange.outputs);
+    let strides: HashSet<_> = outputs
+        .iter()
+        .map(|(_, _, stride)| stride.unwrap())
+        .collect();
+    assert_eq!(strides.len(), 1);
+    let stride = *strides.iter().next().unwrap();
+    assert_eq!(exchange.outputs.stride, 4 * 20 * stride);
+    let written: HashSet<_> = outputs.iter().map(|(target, ..)| *target).collect();
+    let built_in = |built_in, component| OutputTarget::BuiltIn {
+        built_in,
+        component,
+    };
+    let expected = (0..4)
+        .flat_map(|component| {
+            [
+                built_in(BuiltIn::Position, component),
+                location(0, component),
+            ]
+        })
+        .chain([built_in(BuiltIn::Layer, 0), location(2, 0), location(3, 0)]);
+    assert_eq!(written, expected.collect());
+    let mut offsets: Vec<_> = outputs.iter().map(|(_, offset, _)| *offset).collect();
+    offsets.sort_unstable();
+    offsets.dedup();
+    assert_eq!(offsets.len(), outputs.len());
+    assert!(offsets[0] >= 1 && offsets[offsets.len() - 1] < stride);
+    assert_eq!(shader.outputs[0].target, OutputTarget::VertexCount);
+}
+
+#[gaurast_runner::test]
+fn tessellation_shaders_share_vertices_and_patches() {
+    let control = translated("patches.tesc", &Specialization::default()).interface;
+    assert_eq!(control.modes.output_vertices, Some(5));
+    // 25 patches of 5 vertices are the most in 128 lanes.
+    assert!(control.exchange.groups <= 25);
+    assert_eq!(control.exchange.lanes % 16, 0);
+    let evaluation = translated("patches.tese", &Specialization::default()).interface;
+    let modes = PrimitiveModes {
+        domain: Some(Domain::Quads),
+        spacing: Some(Spacing::FractionalEven),
+        clockwise: Some(true),
+        ..PrimitiveModes::default()
+    };
+    assert_eq!(evaluation.modes, modes);
+    let given = places(&control.exchange.outputs);
+    for (target, _, stride) in places(&evaluation.exchange.inputs) {
+        let is_given = |&(other, _, given): &_| {
+            let given: Option<u32> = given;
+            other == target && given.is_some() == stride.is_some()
+        };
+        assert!(given.iter().any(is_given), "{target:?}");
+    }
+    let of_patch = given.iter().filter(|(_, _, stride)| stride.is_none());
+    // Four and two levels, three values and a matrix.
+    assert_eq!(of_patch.count(), 4 + 2 + 3 + 4);
+    assert!(control.outputs.is_empty());
 }
 
 #[gaurast_runner::test]

@@ -3,7 +3,7 @@
 # the two where there is a compiler. What GLSL can't say is written in SPIR-V's assembly (*.spvasm).
 set -e
 cd "$(dirname "$0")"
-for shader in *.comp *.vert *.frag; do
+for shader in *.comp *.vert *.tesc *.tese *.geom *.frag; do
     glslangValidator --quiet -V --target-env vulkan1.3 -o "$shader.spv" "$shader"
 done
 for shader in *.spvasm; do
