@@ -375,7 +375,7 @@ fn triangles_fill_the_domain(case: &Case) {
         levels([1.0, 4.0, 2.0, 5.0], [6.0, 3.0]),
         levels([9.0, 1.0, 12.0, 7.0], [2.0, 11.0]),
         levels([2.3, 5.7, 1.6, 3.4], [4.6, 7.2]),
-        levels([20.0, 3.0, 31.0, 64.0], [13.0, 1.0]),
+        levels([20.0, 3.0, 31.0, 64.0], [13.0, 2.0]),
     ];
     let kinds = [
         ("equal_spacing, cw", Origin::UPPER_LEFT),
@@ -583,9 +583,9 @@ fn invocations_exchange_values(case: &Case) {
         void main() {
             int me = gl_InvocationID, next = (gl_InvocationID + 1) % 6;
             int from = int(gl_in[0].gl_Position.x);
-            steps[me] = ivec2(10 * from + me, 0);
+            steps[gl_InvocationID] = ivec2(10 * from + me, 0);
             barrier();
-            steps[me].y = steps[next].x * 2;
+            steps[gl_InvocationID].y = steps[next].x * 2;
             barrier();
             int both = steps[next].y + steps[me].y;
             list[5 - me] = float(both);
@@ -716,7 +716,7 @@ fn sizes_of_patches_are_dynamic(case: &Case) {
     let control = "
         layout(vertices = 1) out;
         void main() {
-            gl_out[0].gl_Position = vec4(gl_PatchVerticesIn, gl_in[gl_PatchVerticesIn - 1].gl_Position.xy, 1.0);
+            gl_out[gl_InvocationID].gl_Position = vec4(gl_PatchVerticesIn, gl_in[gl_PatchVerticesIn - 1].gl_Position.xy, 1.0);
             gl_TessLevelOuter[0] = 1.0;
             gl_TessLevelOuter[1] = 1.0;
         }";
