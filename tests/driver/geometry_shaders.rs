@@ -369,6 +369,45 @@ fn counts_of_vertices_differ(case: &Case) {
     drawn.assert_all(|x, y| if x < y { 1.0 } else { 0.0 });
 }
 
+/// Invocations that skip an emission in one round of a loop emit in the next: those of the set bits of their number.
+#[gaurast_runner::test(needs = [GLSLANG], each = drivers())]
+fn vertices_are_emitted_in_branches(case: &Case) {
+    let gpu = with_geometry(case);
+    let emitting = |body: &str| {
+        format!(
+            "layout(points) in;
+             layout(points, max_vertices = 7) out;
+             layout(location = 0) flat out vec4 value;
+             void emit(int i) {{
+                 gl_Position = vec4((vec2(i, gl_PrimitiveIDIn) + 0.5) / 64.0 - 1.0, 0.0, 1.0);
+                 gl_PointSize = 1.0;
+                 value = vec4(i + 1);
+                 EmitVertex();
+             }}
+             void main() {{
+                 for (int i = 0; i < 7; i++) {{
+                     bool is_set = (gl_PrimitiveIDIn >> i & 1) != 0;
+                     {body}
+                 }}
+             }}"
+        )
+    };
+    for body in [
+        "if (is_set) emit(i);",
+        "if (!is_set) continue; emit(i);",
+        "switch (int(is_set)) { case 1: emit(i); break; default: break; }",
+        "do { if (!is_set) break; emit(i); } while (false);",
+    ] {
+        let shader = emitting(body);
+        let program = Program::new(of(Topology::POINT_LIST, &shader), 1);
+        let drawn = program.draw(gpu, |commands| commands.draw(0..SIDE));
+        drawn.assert_all(|x, y| {
+            let is_set = x < 7 && y >> x & 1 != 0;
+            if is_set { (x + 1) as f32 } else { 0.0 }
+        });
+    }
+}
+
 #[gaurast_runner::test(needs = [GLSLANG], each = drivers())]
 fn one_vertex_is_a_point(case: &Case) {
     let gpu = with_geometry(case);
@@ -387,7 +426,7 @@ fn one_vertex_is_a_point(case: &Case) {
     let drawn = program.draw(gpu, |commands| commands.draw(0..3000));
     drawn.assert_all(|x, y| {
         let n = SIDE * y + x;
-        if n < 3000 && n % 3 != 0 {
+        if n < 3000 && !n.is_multiple_of(3) {
             n as f32
         } else {
             0.0
@@ -732,7 +771,7 @@ fn many_primitives_keep_their_order(case: &Case) {
     let mut cells = [[0.0f32; 16]; 16];
     for n in 0..POINTS {
         let cell = &mut cells[(n * 11 % 256 / 16) as usize][(n * 7 % 16) as usize];
-        *cell = *cell * 0.5 + ((n * 73 >> 3) & 1) as f32;
+        *cell = *cell * 0.5 + (((n * 73) >> 3) & 1) as f32;
     }
     drawn.assert_all(|x, y| match (x / 4, y / 4) {
         (column @ ..16, row @ ..16) => cells[row as usize][column as usize],

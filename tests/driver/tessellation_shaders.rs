@@ -194,6 +194,16 @@ fn lines(Levels { outer, .. }: Levels) -> Vec<[f32; 3]> {
     parts(lines).flat_map(row).collect()
 }
 
+/// The vertices of a patch with equal spacing.
+type Vertices = fn(Levels) -> Vec<[f32; 3]>;
+
+/// The domains, with their vertices.
+const DOMAINS: [(&str, Vertices); 3] = [
+    ("triangles", triangle),
+    ("quads", quad),
+    ("isolines", lines),
+];
+
 /// Levels of all kinds: equal and different ones, ones that are rounded, and ones beyond the limits.
 const KINDS: [Levels; 12] = [
     levels([1.0; 4], [1.0; 2]),
@@ -214,13 +224,7 @@ const KINDS: [Levels; 12] = [
 #[gaurast_runner::test(needs = [GLSLANG], each = drivers())]
 fn vertices_have_equal_spacing(case: &Case) {
     let gpu = with_tessellation(case);
-    type Model = fn(Levels) -> Vec<[f32; 3]>;
-    let domains: [(&str, Model); 3] = [
-        ("triangles", triangle),
-        ("quads", quad),
-        ("isolines", lines),
-    ];
-    for (domain, model) in domains {
+    for (domain, model) in DOMAINS {
         let found = coordinates(gpu, &format!("{domain}, equal_spacing"), &KINDS);
         for (levels, found) in KINDS.into_iter().zip(&found) {
             assert_same(found, &model(levels), &format!("{domain}, {levels:?}"));
@@ -426,12 +430,7 @@ fn assert_border(domain: &str, triangles: &[[Place; 3]], what: &str) {
 #[gaurast_runner::test(needs = [GLSLANG], each = drivers())]
 fn points_are_vertices(case: &Case) {
     let gpu = with_tessellation(case);
-    let models: [(&str, fn(Levels) -> Vec<[f32; 3]>); 3] = [
-        ("triangles", triangle),
-        ("quads", quad),
-        ("isolines", lines),
-    ];
-    for (domain, model) in models {
+    for (domain, model) in DOMAINS {
         let evaluation = evaluation(&format!("{domain}, equal_spacing, point_mode"));
         let buffer = Buffer::of(gpu, &KINDS);
         let program = Program {
