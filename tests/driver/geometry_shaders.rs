@@ -10,7 +10,7 @@ use gaurast_testkit::{
 };
 
 use super::programs::{
-    COVER, Program, SIDE, WORDS, drivers, multiview, need, options, with_geometry,
+    COVER, ONES, Program, SIDE, WORDS, drivers, multiview, need, options, with_geometry,
 };
 use crate::GLSLANG;
 use crate::triangles::devices::own;
@@ -111,12 +111,20 @@ fn assembled(topology: Topology, vertices: &[u32]) -> Vec<Vec<u32>> {
 /// Words of a primitive in the buffer of [`recording`].
 const RECORD: usize = 8;
 
+/// A pipeline whose geometry shader emits nothing.
+fn silent(topology: Topology, geometry: &str) -> PipelineOptions<'_> {
+    PipelineOptions {
+        fragment: Some(ONES),
+        ..of(topology, geometry)
+    }
+}
+
 /// A shader that writes a record for each primitive: the number of invocations, and its vertices. Records begin at a
 /// word that is pushed, and so is the number of records of an instance.
 fn recording(input: &str) -> String {
     format!(
         "layout({input}) in;
-         layout(points, max_vertices = 1) out;
+         layout(line_strip, max_vertices = 2) out;
          layout(push_constant) uniform Push {{ uint first; uint primitives; }};
          {WORDS}
          void main() {{
@@ -154,7 +162,10 @@ fn primitives_have_their_vertices(case: &Case) {
             .iter()
             .map(|&count| RECORD * INSTANCES * primitives(topology, count))
             .collect();
-        let program = Program::new(of(topology, &shader), sizes.iter().sum::<usize>() as u32);
+        let program = Program::new(
+            silent(topology, &shader),
+            sizes.iter().sum::<usize>() as u32,
+        );
         let drawn = program.draw(gpu, |commands| {
             let mut first = 0;
             for (&count, size) in counts.iter().zip(&sizes) {
@@ -199,7 +210,7 @@ fn restart_begins_another_run(case: &Case) {
         let shader = recording(input);
         let options = PipelineOptions {
             restart: true,
-            ..of(topology, &shader)
+            ..silent(topology, &shader)
         };
         let expected: Vec<_> = runs
             .iter()
@@ -329,6 +340,7 @@ fn counts_of_vertices_differ(case: &Case) {
     let shader = "
         layout(points) in;
         layout(triangle_strip, max_vertices = 256) out;
+        out gl_PerVertex { vec4 gl_Position; };
         void emit(int i) {
             gl_Position = vec4(vec2(i >> 1, gl_PrimitiveIDIn + (i & 1)) / 64.0 - 1.0, 0.0, 1.0);
             EmitVertex();
@@ -358,10 +370,7 @@ fn counts_of_vertices_differ(case: &Case) {
         }";
     let one = vk::BlendFactor::ONE;
     let options = PipelineOptions {
-        fragment: Some(
-            "layout(location = 0) out vec4 color;
-             void main() { color = vec4(1.0); }",
-        ),
+        fragment: Some(ONES),
         blend: vec![blend(one, one, vk::BlendOp::ADD)],
         ..of(Topology::POINT_LIST, shader)
     };

@@ -82,6 +82,11 @@ pub const FLAT: &str = "
     layout(location = 0) out vec4 color;
     void main() { color = value; }";
 
+/// A fragment shader that writes ones.
+pub const ONES: &str = "
+    layout(location = 0) out vec4 color;
+    void main() { color = vec4(1.0); }";
+
 /// The declaration of the words in the storage buffer.
 pub const WORDS: &str = "
     layout(std430, binding = 0) buffer Words { uint words[]; };";

@@ -12,7 +12,7 @@ use gaurast_testkit::{
 };
 
 use super::programs::{
-    Drawn, Program, WORDS, drivers, multiview, need, options, with_tessellation,
+    Drawn, ONES, Program, WORDS, drivers, multiview, need, options, with_tessellation,
 };
 use crate::GLSLANG;
 
@@ -339,7 +339,7 @@ fn triangles_of(
     );
     let geometry = format!(
         "layout(triangles) in;
-         layout(points, max_vertices = 1) out;
+         layout(line_strip, max_vertices = 2) out;
          layout(location = 0) in vec3 place[];
          layout(location = 1) flat in uint number[];
          {}
@@ -353,6 +353,7 @@ fn triangles_of(
     );
     let mut options = PipelineOptions {
         domain_origin: origin,
+        fragment: Some(ONES),
         ..of(1, CONTROL, &evaluation)
     };
     options.between.push((Stage::Geometry, &geometry));
