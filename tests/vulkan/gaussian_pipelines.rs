@@ -5,7 +5,7 @@ use crate::scene::{over, replace, splats};
 use ash::vk;
 use gaurast::vk::{
     GAUSSIAN_LOCATION_UNUSED_GAURAST, GaussianAntialiasingGAURAST, GaussianLinearizationGAURAST,
-    GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+    GaussianOrderGAURAST, GaussianProjectionModeGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 use gaurast_testkit::{Gpu, Graphics, Shader};
 
@@ -181,6 +181,48 @@ fn fixed_function_projection_has_no_vertex_stage() {
     let text = vk::ShaderModuleCreateInfo::default().code(&[1, 2, 3]);
     // SAFETY: the words are not a valid module, which the driver must survive.
     unsafe { assert!(gpu.device().create_shader_module(&text, None).is_err()) };
+}
+
+/// The device has these stages, but neither projection of Gaussians does.
+#[gaurast_runner::test]
+fn gaussians_have_no_tessellation_or_geometry_stage() {
+    use vk::ShaderStageFlags as Stage;
+    let gpu = open();
+    let features = gpu.features();
+    assert_eq!(features.tessellation_shader, vk::TRUE);
+    assert_eq!(features.geometry_shader, vk::TRUE);
+    let code = [0x0723_0203, 0x0001_0000, 0, 1, 0];
+    let shaders = |stages: &[Stage]| {
+        let shaders = stages.iter();
+        shaders
+            .map(|&stage| Shader::new(stage, code.to_vec()))
+            .collect()
+    };
+    let projected = |mode| with_state(|s| s.projection_mode(mode));
+    let modes = [
+        (
+            GaussianProjectionModeGAURAST::FIXED_FUNCTION,
+            Stage::FRAGMENT,
+        ),
+        (GaussianProjectionModeGAURAST::VERTEX_SHADER, Stage::VERTEX),
+    ];
+    for (mode, used) in modes {
+        for stages in [
+            &[Stage::TESSELLATION_CONTROL, Stage::TESSELLATION_EVALUATION][..],
+            &[Stage::TESSELLATION_EVALUATION],
+            &[Stage::GEOMETRY],
+        ] {
+            let request = Graphics {
+                shaders: shaders(&[&[used], stages].concat()),
+                ..projected(mode)
+            };
+            let error = vk::Result::ERROR_VALIDATION_FAILED_EXT;
+            let refused = format!("must not have a stage {:?}", stages[0]);
+            assert_refused(&gpu, &request, error, &refused);
+            let rule = "VUID-VkGraphicsPipelineCreateInfo-projectionMode-90008";
+            assert_refused(&gpu, &request, error, rule);
+        }
+    }
 }
 
 #[gaurast_runner::test]

@@ -42,11 +42,7 @@ impl Resource {
     fn stages(&self) -> vk::ShaderStageFlags {
         match self {
             Self::Input(_) => vk::ShaderStageFlags::FRAGMENT,
-            _ => {
-                vk::ShaderStageFlags::VERTEX
-                    | vk::ShaderStageFlags::FRAGMENT
-                    | vk::ShaderStageFlags::COMPUTE
-            }
+            _ => vk::ShaderStageFlags::ALL_GRAPHICS | vk::ShaderStageFlags::COMPUTE,
         }
     }
 }

@@ -53,9 +53,18 @@ impl Gpu {
             extensions,
             ..Opening::of(Driver::Embedded)
         };
-        with_settings(&Settings::default(), || {
-            Self::of(Opened::new(None, &opening, Some(features)))
-        })
+        with_settings(&Settings::default(), || Self::open_with(&opening, features))
+    }
+
+    /// Opens a driver's device with the options in `opening`, and with features of its extensions.
+    ///
+    /// # Errors
+    /// [`OpenError`] names the step that failed.
+    pub fn open_with<T: vk::ExtendsDeviceCreateInfo>(
+        opening: &Opening<'_>,
+        features: &mut T,
+    ) -> Result<Self, OpenError> {
+        Self::of(Opened::new(None, opening, Some(features)))
     }
 
     /// Opens this driver through the loader. The process must have been started with the driver's manifest in

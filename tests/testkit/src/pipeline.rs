@@ -357,6 +357,8 @@ pub struct PipelineOptions<'a> {
     pub domain_origin: vk::TessellationDomainOrigin,
     /// True if an index of all ones begins a new primitive.
     pub restart: bool,
+    /// Number of viewports and of scissors.
+    pub viewports: u32,
     /// True if clip space's depths are from -w, not from 0, to w.
     pub negative_one_to_one: bool,
     /// Rasterization.
@@ -403,6 +405,7 @@ impl Default for PipelineOptions<'_> {
             patch_vertices: 0,
             domain_origin: vk::TessellationDomainOrigin::UPPER_LEFT,
             restart: false,
+            viewports: 1,
             negative_one_to_one: false,
             raster: vk::PipelineRasterizationStateCreateInfo::default().line_width(1.0),
             sample_shading: None,
@@ -519,6 +522,7 @@ impl Pipeline {
             patch_vertices: options.patch_vertices,
             domain_origin: options.domain_origin,
             restart: options.restart,
+            viewports: options.viewports,
             negative_one_to_one: options.negative_one_to_one,
             raster: options.raster,
             multisample: vk::PipelineMultisampleStateCreateInfo::default()

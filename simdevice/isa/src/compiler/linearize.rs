@@ -149,6 +149,11 @@ impl Linearizer<'_> {
         self.block_of_loop(block, empty, unmasked);
     }
 
+    /// Linearizes a block that some lanes skip. They may read any variable after it.
+    fn block_of_some_lanes(&mut self, block: &Block, empty: Mark) {
+        self.block_of_loop(block, empty, HashSet::new());
+    }
+
     /// Linearizes a block in which some variables can be assigned without a mask.
     fn block_of_loop(&mut self, block: &Block, empty: Mark, unmasked: HashSet<Reg>) {
         let mut rest = block.iter().peekable();
@@ -354,11 +359,11 @@ impl Linearizer<'_> {
             other,
             target: at_else,
         });
-        self.block(then, at_else);
+        self.block_of_some_lanes(then, at_else);
         self.place(at_else);
         if !otherwise.is_empty() {
             self.control(Step::Else { other, target: end });
-            self.block(otherwise, end);
+            self.block_of_some_lanes(otherwise, end);
         }
         self.place(end);
         self.control(Step::Join {
@@ -419,7 +424,7 @@ impl Linearizer<'_> {
         );
         let end = self.mark();
         self.control(Step::Clear(breaks));
-        self.block(body, end);
+        self.block_of_some_lanes(body, end);
         self.place(end);
         self.control(Step::Join {
             mask: breaks,
@@ -460,7 +465,7 @@ impl Linearizer<'_> {
                 unmatched: case.default.then_some(unmatched),
                 target: next,
             });
-            self.block(&case.body, next);
+            self.block_of_some_lanes(&case.body, next);
             let falls = case.fallthrough && index + 1 < cases.len();
             if !falls && !case.body.last().is_some_and(leaves) {
                 self.control(Step::Leave {

@@ -350,6 +350,77 @@ fn lanes_leave_a_loop_with_their_own_count(case: &Case) {
     });
 }
 
+/// A construct that some lanes of a loop skip.
+#[derive(Clone, Copy)]
+enum Skipped {
+    Branch,
+    Scope,
+    Switch,
+}
+
+#[gaurast_runner::test(each = gaurast_runner::simd_levels())]
+fn lanes_that_skip_a_part_of_a_loop_keep_its_variables(case: &Case) {
+    // Only the loop reads the tally, but lanes that skip an assignment in one round read it in the next.
+    for skipped in [Skipped::Branch, Skipped::Scope, Skipped::Switch] {
+        let mut b = Builder::new();
+        let input = b.input(0, Type::B32, Rate::Varying);
+        let out = b.output(0, Type::B32);
+        let [zero, one, rounds, three] = [0, 1, 8, 3].map(|bits| b.u32(bits));
+        let [round, tally, sum] = std::array::from_fn(|_| b.variable(Type::B32));
+        b.assign(sum, zero);
+        b.assign(round, zero);
+        b.assign(tally, zero);
+        let label = b.begin_loop();
+        let done = b.compute(Op::ULe, &[rounds, round]);
+        b.begin_if(done);
+        b.break_to(label);
+        b.end();
+        let kind = b.compute(Op::IAdd, &[round, input]);
+        let kind = b.compute(Op::URem, &[kind, three]);
+        let is_zero = b.compute(Op::IEq, &[kind, zero]);
+        let add = |b: &mut Builder| {
+            // More than is worth a selection.
+            let mut more = tally;
+            for _ in 0..9 {
+                more = b.compute(Op::IAdd, &[more, one]);
+            }
+            b.assign(tally, more);
+        };
+        match skipped {
+            Skipped::Branch => {
+                b.begin_if(is_zero);
+                add(&mut b);
+            }
+            Skipped::Scope => {
+                let scope = b.begin_scope();
+                let is_other = b.compute(Op::BNot, &[is_zero]);
+                b.begin_if(is_other);
+                b.break_to(scope);
+                b.end();
+                add(&mut b);
+            }
+            Skipped::Switch => {
+                b.begin_switch(kind);
+                b.begin_case(&[0], false);
+                add(&mut b);
+            }
+        }
+        b.end();
+        let total = b.compute(Op::IAdd, &[sum, tally]);
+        b.assign(sum, total);
+        b.begin_continuing();
+        let next = b.compute(Op::IAdd, &[round, one]);
+        b.assign(round, next);
+        b.end();
+        b.assign(out, sum);
+        let program = b.finish().expect("a valid program");
+        compare(case, &program, 9, |input| {
+            let tally = |round| 9 * (0..=round).filter(|round| (round + input) % 3 == 0).count();
+            (0..8).map(|round| tally(round) as u32).sum()
+        });
+    }
+}
+
 #[gaurast_runner::test(each = gaurast_runner::simd_levels())]
 fn lanes_come_back_to_the_count_that_they_left(case: &Case) {
     // The inner loop's counter is set only before the outer loop: a lane that leaves the inner loop early finds its own

@@ -65,7 +65,7 @@ list! {
     geometry:
         geometry_passes_on, adjacent_vertices, adjacent_vertices_of_indices, strips_of_geometry, invocations_of_geometry, numbers_from_geometry, points_become_quads, interfaces_of_geometry, sizes_and_distances_of_geometry, flat_values_of_strips;
     tessellation:
-        tessellated_triangles, tessellated_quads, isolines, tessellated_points, windings_of_patches, domain_origins, curved_patches, values_of_patches, discarded_patches, tessellation_and_geometry;
+        tessellated_triangles, tessellated_quads, isolines, tessellated_points, windings_of_patches, domain_origins, curved_patches, pot_of_patches, values_of_patches, discarded_patches, tessellation_and_geometry;
     models:
         african_head, african_head_of_four_samples, duck, bunny;
 }

@@ -228,6 +228,102 @@ pub fn curved_patches(gpu: &Gpu) -> Drawn {
     Ok(simple(gpu, &TargetOptions::default(), &options, &vertices))
 }
 
+/// Control points of a pot: a lathed body with a lid, and a bent tube for its handle, in patches of 16.
+fn pot() -> Vec<Vertex> {
+    // Bezier curves of radius and height.
+    let profile = [
+        [[0.0, -0.6], [0.35, -0.6], [0.6, -0.5], [0.62, -0.2]],
+        [[0.62, -0.2], [0.64, 0.1], [0.45, 0.3], [0.4, 0.36]],
+        [[0.4, 0.36], [0.3, 0.5], [0.02, 0.4], [0.08, 0.62]],
+    ];
+    let handle = [[0.55, 0.2], [1.0, 0.4], [0.95, -0.4], [0.58, -0.3]];
+    // A quarter of a circle, and half of one.
+    let quarter = [[1.0, 0.0], [1.0, 0.5523], [0.5523, 1.0], [0.0, 1.0]];
+    let half = [[1.0, 0.0], [1.0, 1.3333], [-1.0, 1.3333], [-1.0, 0.0]];
+    let mut points = Vec::new();
+    for curve in profile {
+        for turn in 0..4 {
+            for [radius, height] in curve {
+                points.extend(quarter.map(|[x, z]| {
+                    let [x, z] = [[x, z], [-z, x], [-x, -z], [z, -x]][turn];
+                    [radius * x, height, radius * z]
+                }));
+            }
+        }
+    }
+    for side in [1.0, -1.0] {
+        for [x, y] in handle {
+            points.extend(half.map(|[out, depth]| [x + 0.08 * out * side, y, 0.08 * depth * side]));
+        }
+    }
+    // Seen from above and from the side.
+    let (sin, cos) = (0.45f32.sin(), 0.45f32.cos());
+    let seen = |[x, y, z]: [f32; 3]| {
+        let (x, z) = (0.9 * x + 0.435 * z, 0.9 * z - 0.435 * x);
+        let (y, z) = (cos * y + sin * z, cos * z - sin * y);
+        let w = 1.0 + 0.2 * z;
+        [0.8 * x, -0.9 * y, (0.5 + 0.3 * z) * w, w]
+    };
+    let vertex = |point| Vertex {
+        position: seen(point),
+        color: [1.0; 4],
+    };
+    points.into_iter().map(vertex).collect()
+}
+
+/// A pot of bicubic patches, coloured by the direction of its surface. Triangles are so small that the pot looks the same
+/// however patches are divided.
+pub fn pot_of_patches(gpu: &Gpu) -> Drawn {
+    needed(gpu)?;
+    let kinds = [
+        ("equal_spacing", "32.0"),
+        ("fractional_even_spacing", "31.3"),
+    ];
+    let name = |&(spacing, _): &(&str, _)| spacing.to_owned();
+    Ok(cases(kinds, name, |&(spacing, level)| {
+        let levels = format!(
+            "for (int i = 0; i < 4; i++) gl_TessLevelOuter[i] = {level};
+             for (int i = 0; i < 2; i++) gl_TessLevelInner[i] = {level};"
+        );
+        let control = control(16, &levels);
+        let evaluation = format!(
+            "layout(quads, {spacing}) in;
+             layout(location = 0) out vec4 v_color;
+             vec4 weights(float t) {{
+                 float s = 1.0 - t;
+                 return vec4(s * s * s, 3.0 * t * s * s, 3.0 * t * t * s, t * t * t);
+             }}
+             vec4 slopes(float t) {{
+                 float s = 1.0 - t;
+                 return vec4(-s * s, s * s - 2.0 * t * s, 2.0 * t * s - t * t, t * t);
+             }}
+             vec4 surface(vec4 across, vec4 up) {{
+                 vec4 sum = vec4(0.0);
+                 for (int i = 0; i < 16; i++) sum += across[i & 3] * up[i >> 2] * gl_in[i].gl_Position;
+                 return sum;
+             }}
+             void main() {{
+                 // A little inside, where no edge is a point.
+                 vec2 at = 0.02 + 0.96 * gl_TessCoord.xy;
+                 vec3 normal = cross(
+                     surface(slopes(at.x), weights(at.y)).xyz,
+                     surface(weights(at.x), slopes(at.y)).xyz);
+                 gl_Position = surface(weights(gl_TessCoord.x), weights(gl_TessCoord.y));
+                 v_color = vec4(0.5 + 0.45 * normalize(normal), 1.0);
+             }}"
+        );
+        let options = PipelineOptions {
+            depth_stencil: gaurast_testkit::depth_test(vk::CompareOp::LESS),
+            ..of(16, &control, &evaluation)
+        };
+        let target = TargetOptions::with_depth(vk::Format::D32_SFLOAT);
+        let mut drawn = simple(gpu, &target, &options, &pot());
+        // Depths are those of the triangles.
+        drawn.pictures.retain(|picture| picture.name != "depth");
+        drawn
+    }))
+}
+
 /// Values of the whole patch, outputs that other invocations read after a barrier, and more output vertices than input
 /// vertices.
 pub fn values_of_patches(gpu: &Gpu) -> Drawn {
