@@ -160,7 +160,7 @@ unsafe impl Send for DebugReportCallback {}
 // SAFETY: as for `Send`.
 unsafe impl Sync for DebugReportCallback {}
 
-/// What a callback of `VK_EXT_debug_report` gets besides a message's text.
+/// The origin of a message, which a callback of `VK_EXT_debug_report` gets beside the text.
 #[derive(Clone, Copy)]
 pub(crate) struct ReportOrigin<'a> {
     pub(crate) object_type: vk::DebugReportObjectTypeEXT,

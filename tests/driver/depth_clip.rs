@@ -138,7 +138,7 @@ fn clip_space_begins_at_minus_w_where_the_pipeline_says_so() {
 /// A depth test of fragments whose shader writes their depth.
 #[derive(Clone, Copy)]
 struct WrittenDepth {
-    /// What the fragment shader declares besides.
+    /// Further declarations of the fragment shader.
     declarations: &'static str,
     format: vk::Format,
     clamp: bool,

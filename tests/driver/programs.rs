@@ -129,7 +129,7 @@ pub struct Program<'a> {
     pub layers: u32,
 }
 
-/// What a program has written.
+/// The words and pixels that a program has written.
 pub struct Drawn {
     texels: Vec<[f32; 4]>,
     /// The words of the storage buffer.

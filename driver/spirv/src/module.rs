@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use spirv::{BuiltIn, Capability, Decoration, ExecutionModel, Op};
+use spirv::{BuiltIn, Capability, Decoration, ExecutionModel, FPRoundingMode, Op};
 
 use super::decoder::{HEADER_WORDS, decode};
 use super::error::Error;
@@ -262,6 +262,15 @@ impl Module {
         built_in(self.decorations.get(&id)?)
     }
 
+    /// Reports whether a result is decorated to be rounded towards zero.
+    pub(crate) fn rounds_towards_zero(&self, id: u32) -> bool {
+        let mode = self
+            .decorations
+            .get(&id)
+            .and_then(|all| enumerant(all, Decoration::FPRoundingMode));
+        mode.and_then(FPRoundingMode::from_u32) == Some(FPRoundingMode::RTZ)
+    }
+
     /// Reports whether a struct's member has a decoration.
     pub(crate) fn member_has(&self, id: u32, member: u32, decoration: Decoration) -> bool {
         self.member_decorations
@@ -384,11 +393,13 @@ fn literal(all: &[Decorated], decoration: Decoration) -> Option<u32> {
 }
 
 fn built_in(all: &[Decorated]) -> Option<BuiltIn> {
-    let mut found = all
-        .iter()
-        .filter(|one| one.decoration == Decoration::BuiltIn);
-    match found.next()?.parameters.first()? {
-        Operand::Enumerant(value) => BuiltIn::from_u32(*value),
+    enumerant(all, Decoration::BuiltIn).and_then(BuiltIn::from_u32)
+}
+
+fn enumerant(all: &[Decorated], decoration: Decoration) -> Option<u32> {
+    let found = all.iter().find(|one| one.decoration == decoration)?;
+    match found.parameters.first()? {
+        Operand::Enumerant(value) => Some(*value),
         _ => None,
     }
 }

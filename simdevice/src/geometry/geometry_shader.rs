@@ -3,7 +3,7 @@
 use super::assemble::corners;
 use super::pieces::Pieces;
 use super::primitive_list::{ListedPrimitive, PrimitiveList};
-use super::primitive_stage::{Environment, StageRunner};
+use super::primitive_stage::{ENOUGH_VERTICES, Environment, StageRunner};
 use super::shade::{OutputReader, Shaded, Vertices};
 use crate::program::interface::PrimitiveInput;
 use crate::program::primitive::GeometryStage;
@@ -13,9 +13,6 @@ use devmem::host;
 use isa::Vector;
 use isa::machine::Stopped;
 use isa::resources::Resources;
-
-/// The number of vertices after which they are set up.
-const ENOUGH_VERTICES: usize = 8192;
 
 /// Runs a geometry program.
 pub(super) struct GeometryShader<'a> {

@@ -7,7 +7,10 @@ use isa::machine::{LaneMask, Stopped, Watchdog};
 use isa::resources::Resources;
 use std::sync::atomic::AtomicU32;
 
-/// What the programs of a draw share.
+/// The number of vertices after which they go on to the next stage, or to set-up.
+pub(super) const ENOUGH_VERTICES: usize = 8192;
+
+/// The surroundings that the programs of a draw share.
 #[derive(Clone, Copy)]
 pub(super) struct Environment<'a> {
     pub watchdog: Watchdog<'a>,

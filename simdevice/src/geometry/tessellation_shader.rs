@@ -3,7 +3,7 @@
 
 use super::pieces::Pieces;
 use super::primitive_list::PrimitiveList;
-use super::primitive_stage::{Environment, StageRunner};
+use super::primitive_stage::{ENOUGH_VERTICES, Environment, StageRunner};
 use super::shade::{OutputReader, Shaded, Vertices};
 use crate::program::interface::PrimitiveInput;
 use crate::program::primitive::TessellationStage;
@@ -14,9 +14,6 @@ use isa::machine::Stopped;
 use isa::resources::Resources;
 use std::sync::atomic::Ordering::Relaxed;
 
-/// The number of vertices after which they go on to the next stage.
-const ENOUGH_VERTICES: usize = 8192;
-
 /// Runs the programs of tessellation.
 pub(super) struct TessellationShader<'a> {
     stage: &'a TessellationStage,
@@ -25,8 +22,10 @@ pub(super) struct TessellationShader<'a> {
     reader: OutputReader<'a>,
     tessellation: Tessellation,
     environment: Environment<'a>,
-    /// What the control program gave, patch by patch: the values of each vertex, then those of the patch.
+    /// The values that the control program gave, patch by patch: those of each vertex, then those of the patch.
     patches: Vec<u32>,
+    /// The number of values of each vertex and of each patch.
+    values: usize,
     divided: TessellatedPatch,
     batch: Batch,
     shaded: Shaded,
@@ -44,15 +43,7 @@ struct Batch {
     ids: Vec<u32>,
 }
 
-/// The patches that the control program shaded last.
-struct Shape {
-    /// The number of values of each vertex and of each patch.
-    values: usize,
-    /// The number of rows of values of a patch.
-    rows: usize,
-}
-
-/// What takes the vertices and primitives of tessellation.
+/// The receiver of the vertices and primitives of tessellation.
 pub(super) type Receiver<'r> =
     dyn FnMut(&Shaded, &PrimitiveList, &mut Pieces<'_>) -> Result<(), Stopped> + 'r;
 
@@ -72,6 +63,7 @@ impl<'a> TessellationShader<'a> {
             tessellation,
             environment,
             patches: Vec::new(),
+            values: stage.gives.values.len(),
             divided: TessellatedPatch::default(),
             batch: Batch::default(),
             shaded: Shaded::default(),
@@ -87,10 +79,6 @@ impl<'a> TessellationShader<'a> {
         pieces: &mut Pieces<'_>,
         receive: &mut Receiver<'_>,
     ) -> Result<(), Stopped> {
-        let shape = Shape {
-            values: self.stage.gives.values.len(),
-            rows: self.stage.output_vertices + 1,
-        };
         self.shaded.clear();
         self.primitives.clear(self.tessellation.corners());
         let most = self.control.stage.groups;
@@ -102,16 +90,16 @@ impl<'a> TessellationShader<'a> {
                 .counters
                 .add(Counter::TessellationPatches, count as u64);
             ran?;
-            self.take_patches(&shape, count);
+            self.take_patches(count);
             for patch in 0..count {
-                self.divide(&shape, patch, patches.ids[first + patch], pieces)?;
+                self.divide(patch, patches.ids[first + patch], pieces)?;
                 if self.shaded.vertices.len() >= ENOUGH_VERTICES {
-                    self.evaluate(&shape, pieces)?;
+                    self.evaluate(pieces)?;
                     self.hand_over(pieces, receive)?;
                 }
             }
             // The next patches of the control program replace these.
-            self.evaluate(&shape, pieces)?;
+            self.evaluate(pieces)?;
         }
         self.hand_over(pieces, receive)
     }
@@ -152,18 +140,18 @@ impl<'a> TessellationShader<'a> {
     }
 
     /// Copies what the control program gave, since its next batch replaces it.
-    fn take_patches(&mut self, shape: &Shape, count: usize) {
+    fn take_patches(&mut self, count: usize) {
         let gives = &self.stage.gives;
         self.patches.clear();
         for patch in 0..count as u32 {
             let start = gives.start + patch * gives.stride;
-            for row in 0..shape.rows as u32 {
-                let is_patch = row as usize + 1 == shape.rows;
+            for row in 0..=self.stage.output_vertices {
+                let is_patch = row == self.stage.output_vertices;
                 for value in &gives.values {
                     let bits = match value.vertex_stride {
-                        Some(stride) if !is_patch => {
-                            self.control.given(start + value.offset + row * stride)
-                        }
+                        Some(stride) if !is_patch => self
+                            .control
+                            .given(start + value.offset + row as u32 * stride),
                         None if is_patch => self.control.given(start + value.offset),
                         _ => 0,
                     };
@@ -174,13 +162,7 @@ impl<'a> TessellationShader<'a> {
     }
 
     /// Divides a patch of the control program's batch, and adds its vertices to batches of the evaluation program.
-    fn divide(
-        &mut self,
-        shape: &Shape,
-        patch: usize,
-        id: u32,
-        pieces: &mut Pieces<'_>,
-    ) -> Result<(), Stopped> {
+    fn divide(&mut self, patch: usize, id: u32, pieces: &mut Pieces<'_>) -> Result<(), Stopped> {
         let gives = &self.stage.gives;
         let start = gives.start + patch as u32 * gives.stride;
         let level = |offset: Option<u32>| {
@@ -202,13 +184,13 @@ impl<'a> TessellationShader<'a> {
             if self.batch.points.len() == lanes
                 || self.batch.ids.len() == self.evaluation.stage.groups
             {
-                self.evaluate(shape, pieces)?;
+                self.evaluate(pieces)?;
             }
             let group = self.batch.ids.len();
-            let values = shape.values * shape.rows;
+            let values = self.values * (self.stage.output_vertices + 1);
             let rows = &self.patches[patch * values..][..values];
-            let (vertices, of_patch) = rows.split_at(values - shape.values);
-            let vertices = vertices.chunks_exact(shape.values.max(1));
+            let (vertices, of_patch) = rows.split_at(values - self.values);
+            let vertices = vertices.chunks_exact(self.values.max(1));
             self.evaluation.take(group, vertices, of_patch);
             self.batch.ids.push(id);
             let part = rest.len().min(lanes - self.batch.points.len());
@@ -241,13 +223,13 @@ impl<'a> TessellationShader<'a> {
     }
 
     /// Runs the evaluation program on the vertices that wait.
-    fn evaluate(&mut self, shape: &Shape, pieces: &mut Pieces<'_>) -> Result<(), Stopped> {
+    fn evaluate(&mut self, pieces: &mut Pieces<'_>) -> Result<(), Stopped> {
         let batch = &self.batch;
         let count = batch.points.len();
         if count == 0 {
             return Ok(());
         }
-        let output_vertices = shape.rows as u32 - 1;
+        let output_vertices = self.stage.output_vertices as u32;
         let ran = self.evaluation.run(count, |input, lane| match input {
             PrimitiveInput::TessCoord(axis) => batch.points[lane][axis].to_bits(),
             PrimitiveInput::Patch => batch.groups[lane],

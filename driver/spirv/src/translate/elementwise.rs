@@ -784,11 +784,38 @@ pub fn conversion(t: &mut Translator, it: &Instruction) -> Result<()> {
     }
     let (to, _) = t.globals.types.vector(it.ty()?)?;
     let (from, regs) = t.vector(it.id(0)?)?;
+    let truncates = opcode == Op::FConvert
+        && to == (Scalar::Float { width: 16 })
+        && t.module.rounds_towards_zero(it.result()?);
     let regs = regs
         .iter()
-        .map(|reg| convert(t, opcode, from, to, *reg))
+        .map(|reg| {
+            if truncates {
+                Ok(truncate_to_half(t, from, *reg))
+            } else {
+                convert(t, opcode, from, to, *reg)
+            }
+        })
         .collect::<Result<_>>()?;
     t.define(it, regs)
+}
+
+/// A float rounded towards zero to binary16.
+fn truncate_to_half(t: &mut Translator, from: Scalar, reg: Reg) -> Reg {
+    // The bit that rounding to odd may set is below those of a binary16.
+    let exact = if from.is_wide() {
+        round_to_odd(t, reg)
+    } else {
+        reg
+    };
+    let half = t.emit.op(Ir::FToF16, &[exact]);
+    let near = t.emit.op(Ir::F16ToF, &[half]);
+    let [found, wanted] = [near, exact].map(|reg| t.emit.op(Ir::FAbs, &[reg]));
+    let is_outwards = t.emit.op(Ir::FLt, &[wanted, found]);
+    let one = t.emit.u32(1);
+    let below = t.emit.op(Ir::ISub, &[half, one]);
+    let inwards = t.emit.select(is_outwards, below, half);
+    t.emit.op(Ir::F16ToF, &[inwards])
 }
 
 fn convert(t: &mut Translator, opcode: Op, from: Scalar, to: Scalar, reg: Reg) -> Result<Reg> {

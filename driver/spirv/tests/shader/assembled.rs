@@ -86,6 +86,70 @@ fn extended_arithmetic_of_all_widths() {
     }
 }
 
+/// The binary16 with the greatest magnitude that is not beyond a number.
+fn towards_zero(value: f64) -> half::f16 {
+    if !value.is_finite() {
+        return half::f16::from_f64(value);
+    }
+    // All finite magnitudes in order.
+    let mut magnitudes = (0..=0x7BFF).map(|bits| half::f16::from_bits(bits).to_f64());
+    let below = magnitudes.rfind(|it| *it <= value.abs()).unwrap();
+    half::f16::from_f64(below.copysign(value))
+}
+
+#[gaurast_runner::test]
+fn conversions_round_as_they_are_decorated() {
+    let mut random = Random(79);
+    let ends = [
+        0.0,
+        -0.0,
+        1.0 + 1.0 / 1024.0,
+        1.0 + 0.75 / 1024.0,
+        65504.0,
+        65519.9,
+        65536.0,
+        -1e30,
+        2f64.powi(-14) * (1.0 - 1e-5),
+        2f64.powi(-24) * 0.99,
+        -2f64.powi(-25),
+        1e-300,
+        -f64::MAX,
+        f64::INFINITY,
+        f64::NEG_INFINITY,
+    ];
+    let mut wide: Vec<f64> = ends.to_vec();
+    while wide.len() < LANES {
+        let exponent = random.below(44) as i32 - 27;
+        let mantissa = 1.0 + f64::from(random.next()) / f64::from(u32::MAX);
+        let sign = if random.below(2) == 0 { 1.0 } else { -1.0 };
+        wide.push(sign * mantissa * 2f64.powi(exponent));
+    }
+    let narrow: Vec<u32> = wide.iter().map(|it| (*it as f32).to_bits()).collect();
+    let words: Vec<u32> = wide
+        .iter()
+        .flat_map(|it| [it.to_bits() as u32, (it.to_bits() >> 32) as u32])
+        .collect();
+    let operands = [&buffer(&narrow), &buffer(&words)];
+    let results = run("towards_zero.comp", &operands, 2 * LANES);
+    let results: Vec<u16> = results
+        .iter()
+        .flat_map(|word| [*word as u16, (*word >> 16) as u16])
+        .collect();
+    for (lane, value) in wide.iter().enumerate() {
+        let float = *value as f32;
+        let expected = [
+            towards_zero(f64::from(float)),
+            half::f16::from_f32(float),
+            towards_zero(*value),
+            half::f16::from_f64(*value),
+        ];
+        for (row, expected) in expected.into_iter().enumerate() {
+            let found = results[row * LANES + lane];
+            assert_eq!(found, expected.to_bits(), "row {row}: {value:e}");
+        }
+    }
+}
+
 #[gaurast_runner::test]
 fn bit_fields_with_wide_offsets_and_exponents() {
     let mut random = Random(73);
