@@ -7,11 +7,14 @@ use crate::device::Device;
 use crate::device_sync::DeviceSync;
 use ash::vk;
 use ash::vk::{QueryPipelineStatisticFlags as Statistic, QueryResultFlags};
+use simdevice::host;
+use simdevice::limits::MAX_VERTEX_STREAMS;
 use simdevice::stats::counters::Counter;
 use simdevice::stats::query;
 use simdevice::stats::query::{QueryKind, QueryResult};
 use std::mem::MaybeUninit;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use std::time::Duration;
 
 /// The period in which a wait for a query checks whether the device was lost.
@@ -24,6 +27,8 @@ pub(crate) struct QueryPool {
     pub(crate) queries: Arc<query::QueryPool>,
     /// The kind of values in results.
     query_type: QueryType,
+    /// The vertex stream of each query, if the pool's queries are of streams.
+    streams: Box<[AtomicU32]>,
 }
 
 /// The kind of values in the results of a pool's queries.
@@ -33,6 +38,8 @@ pub(crate) enum QueryType {
     Timestamp,
     /// Counters as `VkPerformanceCounterResultKHR`s, in order.
     Performance(Vec<u32>),
+    /// Counters of a vertex stream as words, in order: transform feedback, and the number of primitives.
+    OfStream(&'static [[Counter; MAX_VERTEX_STREAMS]]),
     /// Counters as words, in order: occlusion and pipeline statistics. `None` is a statistic that is always zero on
     /// this device.
     Words(Vec<Option<Counter>>),
@@ -105,7 +112,7 @@ impl QueryType {
             Self::Words(counters) if counters.contains(&Some(Counter::FragmentInvocations)) => {
                 QueryKind::Fragments
             }
-            Self::Performance(_) | Self::Words(_) => QueryKind::Performance,
+            Self::Performance(_) | Self::Words(_) | Self::OfStream(_) => QueryKind::Performance,
         }
     }
 
@@ -115,6 +122,7 @@ impl QueryType {
             Self::Timestamp => 1,
             Self::Performance(counters) => counters.len(),
             Self::Words(counters) => counters.len(),
+            Self::OfStream(counters) => counters.len(),
         }
     }
 }
@@ -130,9 +138,25 @@ objects! { vk::QueryPool => QueryPool; }
 impl QueryPool {
     /// A pool of `count` queries.
     pub(crate) fn new(query_type: QueryType, count: u32) -> Self {
+        let of_streams = matches!(query_type, QueryType::OfStream(_));
+        let streams = if of_streams { count } else { 0 };
+        let streams = host::collect((0..streams).map(|_| AtomicU32::new(0)));
         Self {
             queries: Arc::new(query::QueryPool::new(query_type.kind(), count)),
             query_type,
+            streams: streams.into_boxed_slice(),
+        }
+    }
+
+    /// Reports whether its queries count primitives of a vertex stream.
+    pub(crate) fn is_of_streams(&self) -> bool {
+        matches!(self.query_type, QueryType::OfStream(_))
+    }
+
+    /// Sets the vertex stream that a query counts.
+    pub(crate) fn set_stream(&self, query: u32, stream: u32) {
+        if let Some(slot) = self.streams.get(query as usize) {
+            slot.store(stream, Relaxed);
         }
     }
 
@@ -141,10 +165,11 @@ impl QueryPool {
         u64::from(first) + u64::from(count) <= u64::from(self.queries.count())
     }
 
-    /// The bytes that Vulkan writes for a query: its values, as words of 32 or 64 bits, if it is available; then its
+    /// The bytes that Vulkan writes for a query with a result: its values, as words of 32 or 64 bits, if it is available; then its
     /// availability, if the flags ask for it. Each is an offset from the query's place, and bytes.
     pub(crate) fn written(
         &self,
+        query: u32,
         result: Option<&QueryResult>,
         flags: QueryResultFlags,
     ) -> Vec<(u64, Vec<u8>)> {
@@ -160,7 +185,7 @@ impl QueryPool {
         };
         let mut written = Vec::new();
         let values = match result {
-            Some(result) => Some(self.values(result)),
+            Some(result) => Some(self.values(query, result)),
             // The partial result is zero: counters are only known when the query ends.
             None if flags.contains(QueryResultFlags::PARTIAL) => {
                 Some(vec![0; self.query_type.count()])
@@ -177,13 +202,18 @@ impl QueryPool {
         written
     }
 
-    fn values(&self, result: &QueryResult) -> Vec<u64> {
+    fn values(&self, query: u32, result: &QueryResult) -> Vec<u64> {
         let counters = match result {
             QueryResult::Timestamp(nanoseconds) => return vec![*nanoseconds],
             QueryResult::Performance(counters) => counters,
         };
         match &self.query_type {
             QueryType::Timestamp => vec![0],
+            QueryType::OfStream(counted) => {
+                let stream = self.streams.get(query as usize);
+                let stream = stream.map_or(0, |stream| stream.load(Relaxed)) as usize;
+                counted.iter().map(|of| counters.get(of[stream])).collect()
+            }
             QueryType::Performance(indices) => {
                 let value = |&index: &u32| counters.values().get(index as usize).copied();
                 indices
@@ -247,6 +277,12 @@ unsafe fn new_pool(info: &vk::QueryPoolCreateInfo<'_>) -> Result<QueryPool, Erro
         vk::QueryType::TIMESTAMP => QueryType::Timestamp,
         vk::QueryType::OCCLUSION => QueryType::occlusion(),
         vk::QueryType::PIPELINE_STATISTICS => QueryType::statistics(info.pipeline_statistics),
+        vk::QueryType::TRANSFORM_FEEDBACK_STREAM_EXT => {
+            QueryType::OfStream(&[Counter::CAPTURED, Counter::CAPTURE_NEEDED])
+        }
+        vk::QueryType::PRIMITIVES_GENERATED_EXT => {
+            QueryType::OfStream(&[Counter::PRIMITIVES_OF_STREAMS])
+        }
         vk::QueryType::PERFORMANCE_QUERY_KHR => {
             // SAFETY: the caller's promise.
             let counters = unsafe {
@@ -318,7 +354,7 @@ pub(crate) fn get_query_pool_results(
     for index in 0..query_count {
         let result = result(query_pool, first_query + index, flags, device.sync())?;
         all_available &= result.is_some();
-        for (place, bytes) in query_pool.written(result.as_ref(), flags) {
+        for (place, bytes) in query_pool.written(first_query + index, result.as_ref(), flags) {
             let offset = (u64::from(index) * stride + place) as usize;
             let Some(target) = data.get_mut(offset..offset + bytes.len()) else {
                 return Err(Error::usage(
@@ -357,7 +393,7 @@ mod tests {
         ];
         let pool = QueryPool::new(QueryType::Performance(order), 1);
         let result = QueryResult::Performance(Box::new(counters));
-        let written = pool.written(Some(&result), QueryResultFlags::empty());
+        let written = pool.written(0, Some(&result), QueryResultFlags::empty());
         let expected = [5u64.to_ne_bytes(), 7u64.to_ne_bytes()].concat();
         assert_eq!(written, [(0, expected)]);
     }
@@ -368,17 +404,17 @@ mod tests {
         let flags = QueryResultFlags::WITH_AVAILABILITY;
         let result = QueryResult::Timestamp((1 << 32) + 9);
         assert_eq!(
-            pool.written(Some(&result), flags),
+            pool.written(0, Some(&result), flags),
             [
                 (0, 9u32.to_ne_bytes().to_vec()),
                 (4, 1u32.to_ne_bytes().to_vec())
             ]
         );
         assert_eq!(
-            pool.written(None, flags | QueryResultFlags::TYPE_64),
+            pool.written(0, None, flags | QueryResultFlags::TYPE_64),
             [(8, 0u64.to_ne_bytes().to_vec())]
         );
-        assert!(pool.written(None, QueryResultFlags::TYPE_64).is_empty());
+        assert!(pool.written(0, None, QueryResultFlags::TYPE_64).is_empty());
         assert!(pool.has(1, 2) && !pool.has(2, 2) && !pool.has(u32::MAX, 2));
     }
 
@@ -394,9 +430,12 @@ mod tests {
         let result = QueryResult::Performance(Box::new(counters));
         let words = |words: [u32; 3]| words.map(u32::to_ne_bytes).concat();
         let none = QueryResultFlags::empty();
-        assert_eq!(pool.written(Some(&result), none), [(0, words([3, 0, 7]))]);
-        assert!(pool.written(None, none).is_empty());
-        let partial = pool.written(None, QueryResultFlags::PARTIAL);
+        assert_eq!(
+            pool.written(0, Some(&result), none),
+            [(0, words([3, 0, 7]))]
+        );
+        assert!(pool.written(0, None, none).is_empty());
+        let partial = pool.written(0, None, QueryResultFlags::PARTIAL);
         assert_eq!(partial, [(0, words([0; 3]))]);
     }
 }

@@ -65,6 +65,7 @@ fn programs() -> DrawPrograms {
         vertex_inputs: attribute(0).chain(attribute(1)).collect(),
         vertex_outputs: position.chain(varyings).collect(),
         varyings: 3,
+        captured: None,
         tessellation: None,
         geometry: None,
         fragment: Some(FragmentPrograms {
@@ -187,6 +188,7 @@ fn main() {
             first_instance: 0,
             instance_count: 1,
             draw_index: 0,
+            transform_feedback: None,
         };
         measure(name, &device, &draw);
     }

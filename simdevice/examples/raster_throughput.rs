@@ -78,6 +78,7 @@ fn programs(rounds: u32) -> DrawPrograms {
         vertex_inputs: attribute(0).chain(attribute(1)).collect(),
         vertex_outputs: position.chain(varyings).collect(),
         varyings: 4,
+        captured: None,
         tessellation: None,
         geometry: None,
         fragment: Some(FragmentPrograms {
@@ -280,6 +281,7 @@ fn measure(device: &Arc<Device>, scene: &Scene) {
         first_instance: 0,
         instance_count: 1,
         draw_index: 0,
+        transform_feedback: None,
     };
     let attachment = |format, value| Attachment {
         view: target(format, scene.samples),

@@ -237,6 +237,14 @@ impl CommandProcessor {
                 }
                 Ok(())
             }
+            Packet::BeginTransformFeedback { feedback, counters } => {
+                feedback.begin(counters);
+                Ok(())
+            }
+            Packet::EndTransformFeedback { feedback, counters } => {
+                feedback.end(counters);
+                Ok(())
+            }
             Packet::ResetQueries { pool, first, count } => {
                 pool.reset(*first, *count);
                 Ok(())

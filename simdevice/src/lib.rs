@@ -6,7 +6,8 @@
 //!
 //! Data flows one way: packets -> geometry and Gaussian preprocessing -> binning -> the tile engine -> memory.
 //! [`stats::counters`] records the work that was done. A module imports only those before it: [`limits`], [`state`] and
-//! the vector helpers; [`format`] and [`stats`]; [`image`] and [`runtime`]; [`texture`]; [`program`]; [`packet`];
+//! the vector helpers; [`format`] and [`stats`]; [`image`] and [`runtime`]; [`texture`]; [`program`]; [`transform_feedback`];
+//! [`packet`];
 //! [`geometry`], [`compute`] and [`transfer`]; [`gaussian`]; [`raster`]; [`pass`]; [`command_processor`].
 #![forbid(unsafe_code)]
 
@@ -32,6 +33,7 @@ pub mod stats;
 pub mod tessellation;
 pub mod texture;
 pub mod transfer;
+pub mod transform_feedback;
 
 pub use command_processor::CommandProcessor;
 pub use device::Device;

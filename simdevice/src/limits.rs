@@ -18,6 +18,12 @@ pub const MAX_VIEWPORTS: usize = 16;
 /// The most clip and cull distances of a vertex, both together.
 pub const MAX_CLIP_CULL_DISTANCES: usize = 8;
 
+/// The most buffers that transform feedback writes.
+pub const MAX_TRANSFORM_FEEDBACK_BUFFERS: usize = 4;
+
+/// The most streams of vertices that a geometry program emits.
+pub const MAX_VERTEX_STREAMS: usize = 4;
+
 /// The greatest width and height of an attachment in pixels.
 pub const MAX_FRAMEBUFFER_SIZE: u32 = 1 << 16;
 

@@ -20,6 +20,7 @@ mod robustness;
 mod samplers;
 mod storage;
 mod tessellation_shaders;
+mod transform_feedback;
 mod window;
 #[cfg(target_os = "linux")]
 mod x11;

@@ -2,10 +2,12 @@
 
 use crate::devices::{gaussian, image, open};
 use crate::scene::{
-    FORMAT, HEIGHT, Scene, Splat, WIDTH, camera, over, pass_with, set_viewport, splat, splats,
+    FORMAT, HEIGHT, Scene, Splat, WIDTH, camera, over, pass, pass_with, set_viewport, splat, splats,
 };
 use ash::vk;
-use gaurast_testkit::{Buffer, Gpu, Graphics, Image, ImageOptions, Pass, Target, TargetOptions};
+use gaurast_testkit::{
+    Buffer, Gpu, Graphics, Image, ImageOptions, Pass, Target, TargetOptions, TransformFeedback,
+};
 
 /// Three Gaussians, one behind the others.
 fn gaussians() -> [Splat; 3] {
@@ -251,9 +253,9 @@ fn sample_shading_changes_nothing_without_a_fragment_stage() {
     assert!(resolved(true) == plain);
 }
 
-/// Extensions that make fragments of their own or send vertices elsewhere are absent, so that no pipeline has them.
+/// Extensions that make fragments of their own are absent, so that no pipeline has them.
 #[gaurast_runner::test]
-fn neither_transform_feedback_nor_shading_rates_are_offered() {
+fn no_shading_rates_are_offered() {
     let gpu = open();
     // SAFETY: see the crate.
     let offered = unsafe {
@@ -266,7 +268,6 @@ fn neither_transform_feedback_nor_shading_rates_are_offered() {
         .collect();
     assert!(names.contains(&gaurast::gaussian_primitive_topology::NAME));
     for absent in [
-        ash::ext::transform_feedback::NAME,
         ash::khr::fragment_shading_rate::NAME,
         ash::ext::mesh_shader::NAME,
         ash::ext::conservative_rasterization::NAME,
@@ -277,6 +278,43 @@ fn neither_transform_feedback_nor_shading_rates_are_offered() {
             "{absent:?} needs tests with Gaussians"
         );
     }
+}
+
+/// The picture is the same, and nothing is written.
+#[gaurast_runner::test]
+fn transform_feedback_captures_nothing_of_gaussians() {
+    let mut features =
+        vk::PhysicalDeviceTransformFeedbackFeaturesEXT::default().transform_feedback(true);
+    let gpu = Gpu::extended(&[ash::ext::transform_feedback::NAME], &mut features)
+        .expect("a device with transform feedback");
+    let feedback = TransformFeedback::new(&gpu);
+    let captured = Buffer::with_usage(&gpu, 1024, TransformFeedback::usage());
+    captured.write(&[7u32; 256]);
+    let counter = Buffer::with_usage(&gpu, 4, TransformFeedback::usage());
+    counter.write(&[12u32]);
+    let scene = Scene::on(gpu.clone(), &gaussians(), &splats());
+    let drawn = |captures: bool| {
+        gpu.run(|commands| {
+            let (device, raw) = commands.raw();
+            pass(device, raw, &scene.image, BEHIND, || {
+                scene.bind(device, raw);
+                if captures {
+                    feedback.bind(commands, 0, &[(&captured, 0)]);
+                    feedback.begin(commands, &[(&counter, 0)]);
+                }
+                commands.draw(0..3);
+                if captures {
+                    feedback.end(commands, &[(&counter, 0)]);
+                }
+            });
+        });
+        scene.pixels()
+    };
+    let (plain, beside) = (drawn(false), drawn(true));
+    assert!(plain.iter().any(|pixel| *pixel != BEHIND));
+    assert!(beside == plain);
+    assert_eq!(captured.values::<u32>(), [7; 256]);
+    assert_eq!(counter.values::<u32>(), [12]);
 }
 
 #[gaurast_runner::test]

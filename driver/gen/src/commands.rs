@@ -4,7 +4,7 @@
 //! that a parameter points at. It takes those that it declares, each in the form that it declares: the command's own
 //! type; a handle as the object (`&Buffer`, `&Arc<Buffer>`, `Option<&Buffer>`, or, to be destroyed,
 //! `Option<Arc<Buffer>>`); a pointer as its target (`&T`, `&mut T`, `Option<&T>`, `&[T]`, `&[Arc<Buffer>]`,
-//! `Handles<'_, vk::Buffer>`, `&CStr`, `&mut [MaybeUninit<T>]`, `OutputChain<'_, T>`, and with its count
+//! `Handles<'_, vk::Buffer>` or an option of it, `&CStr`, `&mut [MaybeUninit<T>]`, `OutputChain<'_, T>`, and with its count
 //! `Structures<'_, T>`); a `VkBool32` as a `bool`; a command buffer as its `recorder`; a structure of the chain as
 //! `Option<&T>`; and `&Commands`, the table. An output pointer that it doesn't take receives the value that it returns:
 //! a value, an `Arc` of an object, or a list. If a command has a second version, which takes a structure of the first
@@ -737,6 +737,10 @@ fn convert(wanted: &str, declared: &Member, count: Option<&Count>) -> Option<(St
                 format!("valid::slice({name}.cast::<u8>(), {count})?")
             } else if wanted == format!("Handles<,{pointee}>") {
                 format!("handle::Handles::new({slice})")
+            } else if wanted == format!("Option<Handles<,{pointee}>>") {
+                format!(
+                    "(!{name}.is_null()).then(|| valid::slice({name}, {count})).transpose()?.map(|them| handle::Handles::new(them))"
+                )
             } else if wanted.starts_with("&[Arc<") {
                 format!("&handle::get_all({slice})?")
             } else if wanted.starts_with("&[Option<Arc<") {

@@ -281,8 +281,37 @@ pub struct VertexExchange {
     pub lanes: u32,
     /// The inputs. They are preloaded.
     pub inputs: VertexMemory,
-    /// The outputs. A vertex that a geometry stage emits begins with a word that is 1 if it is the first of a strip.
+    /// The outputs. A vertex that a geometry stage emits begins with a word: bit 0 is 1 if the vertex is the first of a
+    /// strip, and the bits above are the number of its stream.
     pub outputs: VertexMemory,
+}
+
+/// The most buffers that transform feedback writes.
+pub(crate) const MAX_TRANSFORM_FEEDBACK_BUFFERS: usize = 4;
+
+/// The most streams of vertices that a geometry stage emits.
+pub(crate) const MAX_VERTEX_STREAMS: usize = 4;
+
+/// The outputs that transform feedback captures.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct TransformFeedback {
+    /// The bytes from one vertex to the next in each buffer; 0 if the buffer is not written.
+    pub strides: [u32; MAX_TRANSFORM_FEEDBACK_BUFFERS],
+    /// The stream of the vertices in each buffer.
+    pub streams: [u32; MAX_TRANSFORM_FEEDBACK_BUFFERS],
+    /// The scalars, each of 32 bits, by buffer and offset. They don't overlap.
+    pub scalars: Vec<CapturedScalar>,
+}
+
+/// A scalar that transform feedback captures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CapturedScalar {
+    /// The output.
+    pub target: OutputTarget,
+    /// The buffer.
+    pub buffer: u32,
+    /// The first byte within a vertex, a multiple of 4.
+    pub offset: u32,
 }
 
 /// The domain of tessellated patches.
@@ -371,6 +400,8 @@ pub struct Interface {
     pub modes: PrimitiveModes,
     /// Tessellation and geometry: the exchange of vertices.
     pub exchange: VertexExchange,
+    /// The last stage before rasterization: the outputs that transform feedback captures, if there are any.
+    pub transform_feedback: Option<TransformFeedback>,
     /// True if it stores to buffers or images, or uses atomics, so that it can't be skipped.
     pub has_side_effects: bool,
     /// True if it accesses memory by device addresses.

@@ -199,6 +199,8 @@ pub(crate) struct Recorder {
     pub(super) pass: Option<RenderScope>,
     /// True within a set of Gaussian draws.
     pub(super) has_gaussian_set: bool,
+    /// True while transform feedback is active.
+    pub(super) captures: bool,
     error: Option<Error>,
     pending: Arc<AtomicUsize>,
 }
@@ -232,6 +234,7 @@ impl Recorder {
             finished: None,
             pass: None,
             has_gaussian_set: false,
+            captures: false,
             error: None,
             pending: Arc::default(),
         }

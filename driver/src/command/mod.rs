@@ -21,6 +21,7 @@ mod replay;
 pub(crate) mod submit;
 pub(crate) mod sync;
 pub(crate) mod transfer;
+pub(crate) mod transform_feedback;
 
 use crate::abi::error::Error;
 use crate::descriptor::layout::DescriptorSetLayout;
@@ -35,6 +36,7 @@ use ash::vk;
 use simdevice::packet::BufferRange;
 use simdevice::state::gaussian::Camera;
 use simdevice::state::{Rect, Viewport};
+use simdevice::transform_feedback::CounterWords;
 use simdevice::{Format, Packet};
 use std::sync::Arc;
 
@@ -136,6 +138,28 @@ pub(crate) enum Command {
     },
     /// `vkCmdEndConditionalRenderingEXT`.
     EndConditional,
+    /// `vkCmdBindTransformFeedbackBuffersEXT`, for each binding.
+    BindTransformFeedbackBuffer {
+        /// The binding.
+        binding: u32,
+        /// The bytes that may be written.
+        buffer: BufferRange,
+    },
+    /// `vkCmdBeginTransformFeedbackEXT`: the counters are read when it executes.
+    BeginTransformFeedback(Box<CounterWords>),
+    /// `vkCmdEndTransformFeedbackEXT`.
+    EndTransformFeedback(Box<CounterWords>),
+    /// `vkCmdDrawIndirectByteCountEXT`: the number of vertices is computed when it executes.
+    DrawByteCount(DrawByteCount),
+    /// `vkCmdBeginQuery` and `vkCmdBeginQueryIndexedEXT` of a query that counts primitives of a vertex stream.
+    BeginStreamQuery {
+        /// The pool.
+        pool: Arc<QueryPool>,
+        /// The query.
+        query: u32,
+        /// The stream.
+        stream: u32,
+    },
     /// `vkCmdSetEvent` (true) and `vkCmdResetEvent` (false).
     SetEvent(Arc<Event>, bool),
     /// `vkCmdWaitEvents`.
@@ -216,6 +240,21 @@ pub(crate) struct DrawIndirect {
     pub(crate) stride: u32,
     /// True for parameters of indexed draws.
     pub(crate) indexed: bool,
+}
+
+/// A draw of the vertices that transform feedback has written.
+#[derive(Clone, Debug)]
+pub(crate) struct DrawByteCount {
+    /// The word with the number of bytes.
+    pub(crate) counter: BufferRange,
+    /// The bytes before the first vertex that is drawn.
+    pub(crate) counter_offset: u32,
+    /// The bytes of a vertex.
+    pub(crate) vertex_stride: u32,
+    /// The first instance.
+    pub(crate) first_instance: u32,
+    /// The number of instances.
+    pub(crate) instance_count: u32,
 }
 
 /// A copy of query results to a buffer.

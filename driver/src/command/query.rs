@@ -7,6 +7,7 @@ use crate::query_pool::{QueryPool, require_queries};
 use crate::resource::buffer::{Buffer, BufferRules};
 use ash::vk;
 use simdevice::Packet;
+use simdevice::limits::MAX_VERTEX_STREAMS;
 use simdevice::packet::BufferRange;
 use std::sync::Arc;
 
@@ -17,10 +18,44 @@ pub(crate) fn cmd_begin_query(
     query: u32,
 ) -> Result<(), Error> {
     require_queries(query_pool, query, 1, "VUID-vkCmdBeginQuery-query-00802")?;
-    recorder.packet(Packet::BeginQuery {
-        pool: Arc::clone(&query_pool.queries),
-        index: query,
-    });
+    begin_query(recorder, query_pool, query, 0)
+}
+
+/// Begins a query of a vertex stream, or of all work if the pool's queries aren't of streams.
+///
+/// # Errors
+/// [`Error::InvalidUsage`] for a stream that there isn't.
+pub(super) fn begin_query(
+    recorder: &mut Recorder,
+    query_pool: &Arc<QueryPool>,
+    query: u32,
+    stream: u32,
+) -> Result<(), Error> {
+    let streams = match query_pool.is_of_streams() {
+        true => MAX_VERTEX_STREAMS,
+        false => 1,
+    };
+    if stream as usize >= streams {
+        return Err(Error::usage(
+            match query_pool.is_of_streams() {
+                true => "VUID-vkCmdBeginQueryIndexedEXT-queryType-02339",
+                false => "VUID-vkCmdBeginQueryIndexedEXT-queryType-06692",
+            },
+            format!("the index is {stream}, and must be less than {streams}"),
+        ));
+    }
+    if query_pool.is_of_streams() {
+        recorder.push(Command::BeginStreamQuery {
+            pool: Arc::clone(query_pool),
+            query,
+            stream,
+        });
+    } else {
+        recorder.packet(Packet::BeginQuery {
+            pool: Arc::clone(&query_pool.queries),
+            index: query,
+        });
+    }
     Ok(())
 }
 
@@ -116,8 +151,9 @@ const TARGET: BufferRules = BufferRules {
 pub(crate) fn copy_packets(copy: &CopyQueryResults) -> Vec<Packet> {
     let mut packets = Vec::new();
     for index in 0..u64::from(copy.count) {
-        let result = copy.pool.queries.result(copy.first + index as u32);
-        for (place, bytes) in copy.pool.written(result.as_ref(), copy.flags) {
+        let query = copy.first + index as u32;
+        let result = copy.pool.queries.result(query);
+        for (place, bytes) in copy.pool.written(query, result.as_ref(), copy.flags) {
             let offset = index.saturating_mul(copy.stride).saturating_add(place);
             let size = bytes.len() as u64;
             if offset.saturating_add(size) <= copy.target.size {

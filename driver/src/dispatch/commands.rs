@@ -361,6 +361,14 @@ static ROWS: &[Command] = rows! {
     PhysicalDevice, DeviceExtension(&[c"VK_EXT_tooling_info"]) => {
         vkGetPhysicalDeviceToolPropertiesEXT: vk::PFN_vkGetPhysicalDeviceToolProperties = vkGetPhysicalDeviceToolProperties;
     }
+    Device, DeviceExtension(&[c"VK_EXT_transform_feedback"]) => {
+        vkCmdBindTransformFeedbackBuffersEXT: vk::PFN_vkCmdBindTransformFeedbackBuffersEXT = vkCmdBindTransformFeedbackBuffersEXT;
+        vkCmdBeginTransformFeedbackEXT: vk::PFN_vkCmdBeginTransformFeedbackEXT = vkCmdBeginTransformFeedbackEXT;
+        vkCmdEndTransformFeedbackEXT: vk::PFN_vkCmdEndTransformFeedbackEXT = vkCmdEndTransformFeedbackEXT;
+        vkCmdBeginQueryIndexedEXT: vk::PFN_vkCmdBeginQueryIndexedEXT = vkCmdBeginQueryIndexedEXT;
+        vkCmdEndQueryIndexedEXT: vk::PFN_vkCmdEndQueryIndexedEXT = vkCmdEndQueryIndexedEXT;
+        vkCmdDrawIndirectByteCountEXT: vk::PFN_vkCmdDrawIndirectByteCountEXT = vkCmdDrawIndirectByteCountEXT;
+    }
     Device, DeviceExtension(&[c"VK_EXT_vertex_input_dynamic_state"]) => {
         vkCmdSetVertexInputEXT: vk::PFN_vkCmdSetVertexInputEXT = vkCmdSetVertexInputEXT;
     }
@@ -4985,16 +4993,22 @@ unsafe extern "system" fn vkCmdSetTessellationDomainOriginEXT(
 
 unsafe extern "system" fn vkCmdSetRasterizationStreamEXT(
     command_buffer: vk::CommandBuffer,
-    _: u32,
+    rasterization_stream: u32,
 ) {
     guard(command_buffer, "vkCmdSetRasterizationStreamEXT", || {
-        // SAFETY: the application follows Vulkan's valid usage: the handle is live.
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, "vkCmdSetRasterizationStreamEXT", |_| {
-                Err(Error::Unsupported {
-                    command: "vkCmdSetRasterizationStreamEXT".to_owned(),
-                })
-            })
+            record(
+                command_buffer,
+                "vkCmdSetRasterizationStreamEXT",
+                |recorder| {
+                    let stream = rasterization_stream;
+                    crate::command::dynamic_state::set(
+                        recorder,
+                        DynamicState::RasterizationStream { stream },
+                    )
+                },
+            )
         }
     })
 }
@@ -5268,6 +5282,171 @@ unsafe extern "system" fn vkCmdDrawMultiIndexedEXT(
                     p_vertex_offset,
                 )
             })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdBindTransformFeedbackBuffersEXT(
+    command_buffer: vk::CommandBuffer,
+    first_binding: u32,
+    binding_count: u32,
+    p_buffers: *const vk::Buffer,
+    p_offsets: *const vk::DeviceSize,
+    p_sizes: *const vk::DeviceSize,
+) {
+    guard(
+        command_buffer,
+        "vkCmdBindTransformFeedbackBuffersEXT",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                record(
+                    command_buffer,
+                    "vkCmdBindTransformFeedbackBuffersEXT",
+                    |recorder| {
+                        crate::command::transform_feedback::cmd_bind_transform_feedback_buffers(
+                            recorder,
+                            first_binding,
+                            handle::Handles::new(valid::slice(p_buffers, binding_count)?),
+                            valid::slice(p_offsets, binding_count)?,
+                            (!p_sizes.is_null())
+                                .then(|| valid::slice(p_sizes, binding_count))
+                                .transpose()?,
+                        )
+                    },
+                )
+            }
+        },
+    )
+}
+
+unsafe extern "system" fn vkCmdBeginTransformFeedbackEXT(
+    command_buffer: vk::CommandBuffer,
+    first_counter_buffer: u32,
+    counter_buffer_count: u32,
+    p_counter_buffers: *const vk::Buffer,
+    p_counter_buffer_offsets: *const vk::DeviceSize,
+) {
+    guard(command_buffer, "vkCmdBeginTransformFeedbackEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(
+                command_buffer,
+                "vkCmdBeginTransformFeedbackEXT",
+                |recorder| {
+                    crate::command::transform_feedback::cmd_begin_transform_feedback(
+                        recorder,
+                        first_counter_buffer,
+                        (!p_counter_buffers.is_null())
+                            .then(|| valid::slice(p_counter_buffers, counter_buffer_count))
+                            .transpose()?
+                            .map(|them| handle::Handles::new(them)),
+                        (!p_counter_buffer_offsets.is_null())
+                            .then(|| valid::slice(p_counter_buffer_offsets, counter_buffer_count))
+                            .transpose()?,
+                    )
+                },
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdEndTransformFeedbackEXT(
+    command_buffer: vk::CommandBuffer,
+    first_counter_buffer: u32,
+    counter_buffer_count: u32,
+    p_counter_buffers: *const vk::Buffer,
+    p_counter_buffer_offsets: *const vk::DeviceSize,
+) {
+    guard(command_buffer, "vkCmdEndTransformFeedbackEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdEndTransformFeedbackEXT", |recorder| {
+                crate::command::transform_feedback::cmd_end_transform_feedback(
+                    recorder,
+                    first_counter_buffer,
+                    (!p_counter_buffers.is_null())
+                        .then(|| valid::slice(p_counter_buffers, counter_buffer_count))
+                        .transpose()?
+                        .map(|them| handle::Handles::new(them)),
+                    (!p_counter_buffer_offsets.is_null())
+                        .then(|| valid::slice(p_counter_buffer_offsets, counter_buffer_count))
+                        .transpose()?,
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdBeginQueryIndexedEXT(
+    command_buffer: vk::CommandBuffer,
+    query_pool: vk::QueryPool,
+    query: u32,
+    _: vk::QueryControlFlags,
+    index: u32,
+) {
+    guard(command_buffer, "vkCmdBeginQueryIndexedEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdBeginQueryIndexedEXT", |recorder| {
+                crate::command::transform_feedback::cmd_begin_query_indexed(
+                    recorder,
+                    handle::get(query_pool)?,
+                    query,
+                    index,
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdEndQueryIndexedEXT(
+    command_buffer: vk::CommandBuffer,
+    query_pool: vk::QueryPool,
+    query: u32,
+    _: u32,
+) {
+    guard(command_buffer, "vkCmdEndQueryIndexedEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, "vkCmdEndQueryIndexedEXT", |recorder| {
+                crate::command::transform_feedback::cmd_end_query_indexed(
+                    recorder,
+                    handle::get(query_pool)?,
+                    query,
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdDrawIndirectByteCountEXT(
+    command_buffer: vk::CommandBuffer,
+    instance_count: u32,
+    first_instance: u32,
+    counter_buffer: vk::Buffer,
+    counter_buffer_offset: vk::DeviceSize,
+    counter_offset: u32,
+    vertex_stride: u32,
+) {
+    guard(command_buffer, "vkCmdDrawIndirectByteCountEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(
+                command_buffer,
+                "vkCmdDrawIndirectByteCountEXT",
+                |recorder| {
+                    crate::command::transform_feedback::cmd_draw_indirect_byte_count(
+                        recorder,
+                        instance_count,
+                        first_instance,
+                        handle::get(counter_buffer)?,
+                        counter_buffer_offset,
+                        counter_offset,
+                        vertex_stride,
+                    )
+                },
+            )
         }
     })
 }

@@ -8,7 +8,9 @@ use crate::convert;
 use crate::instance::API_VERSION;
 use crate::registry::properties::Properties;
 use ash::vk;
-use simdevice::limits::{MAX_LINE_WIDTH, MAX_POINT_SIZE};
+use simdevice::limits::{
+    MAX_LINE_WIDTH, MAX_POINT_SIZE, MAX_TRANSFORM_FEEDBACK_BUFFERS, MAX_VERTEX_STREAMS,
+};
 use std::ffi::{CStr, c_char};
 use std::sync::LazyLock;
 
@@ -110,6 +112,9 @@ const MAX_GEOMETRY_VERTICES: u32 = 256;
 
 /// The most scalars of all vertices that an invocation of a geometry shader emits.
 const MAX_GEOMETRY_COMPONENTS: u32 = 1024;
+
+/// The most bytes of a vertex that transform feedback writes: those of all varyings.
+const MAX_CAPTURED_BYTES: u32 = 4 * MAX_VARYING_COMPONENTS;
 
 /// The offsets in texels that an instruction may have.
 const TEXEL_OFFSETS: std::ops::RangeInclusive<i32> = -32..=31;
@@ -428,7 +433,17 @@ fn find_properties() -> Properties {
         uniform_texel_buffer_offset_single_texel_alignment: true,
         max_buffer_size: memory::heap_size(),
         provoking_vertex_mode_per_pipeline: true,
-        transform_feedback_preserves_triangle_fan_provoking_vertex: false,
+        transform_feedback_preserves_triangle_fan_provoking_vertex: true,
+        max_transform_feedback_streams: MAX_VERTEX_STREAMS as u32,
+        max_transform_feedback_buffers: MAX_TRANSFORM_FEEDBACK_BUFFERS as u32,
+        max_transform_feedback_buffer_size: u32::MAX.into(),
+        max_transform_feedback_stream_data_size: MAX_CAPTURED_BYTES,
+        max_transform_feedback_buffer_data_size: MAX_CAPTURED_BYTES,
+        max_transform_feedback_buffer_data_stride: 2048,
+        transform_feedback_queries: true,
+        transform_feedback_streams_lines_triangles: true,
+        transform_feedback_rasterization_stream_select: true,
+        transform_feedback_draw: true,
         max_vertex_attrib_divisor: u32::MAX,
         tile_size: vk::Extent2D {
             width: 16,

@@ -197,6 +197,8 @@ dynamic_states! {
     PROVOKING_VERTEX_MODE_EXT => ProvokingVertexMode(mode: vk::ProvokingVertexModeEXT),
         set |state| state.draw.provoking_last = mode == vk::ProvokingVertexModeEXT::LAST_VERTEX,
         needed Fixed::rasterizes, gaussians Ignored;
+    RASTERIZATION_STREAM_EXT => RasterizationStream(stream: u32),
+        set |state| state.draw.rasterized_stream = stream, needed Fixed::rasterizes, gaussians Ignored;
     LINE_RASTERIZATION_MODE_EXT => LineRasterizationMode(mode: vk::LineRasterizationModeEXT),
         set |_| { let _ = mode; }, needed |_| false, gaussians Ignored;
     LINE_STIPPLE_ENABLE_EXT => LineStippleEnable(enable: bool),

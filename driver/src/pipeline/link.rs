@@ -4,7 +4,7 @@
 //! Stages are matched by location and component. A varying is passed on only if the fragment program reads it: other
 //! outputs are removed from the vertex program, so that the device drops the computations for them. A varying that is
 //! read but never written is zero. Clip and cull distances that the fragment program reads are passed on as varyings,
-//! too.
+//! too, and so are the outputs that transform feedback captures.
 
 use super::link_primitives::{
     self, Given, TessellationShaders, carry_written, components_written, given, gives_memory,
@@ -21,7 +21,8 @@ use gaurast_spirv::{
 use simdevice::isa::ir::Output as ProgramOutput;
 use simdevice::program::interface;
 use simdevice::program::interface::{
-    DrawPrograms, FragmentInput, FragmentOutput, FragmentPrograms, VertexInput, VertexOutput,
+    CapturedOutputs, CapturedValue, DrawPrograms, FragmentInput, FragmentOutput, FragmentPrograms,
+    VertexInput, VertexOutput,
 };
 
 /// The shaders of a pipeline's stages.
@@ -67,18 +68,16 @@ pub(crate) fn link(
     for shader in shaders.all() {
         check_widths(&shader.interface)?;
     }
-    let varyings = match shaders.fragment.take() {
-        None => Varyings::new(),
-        Some(mut fragment) => {
-            let evaluation = shaders.tessellation.as_mut().map(|it| &mut it.evaluation);
-            let last = shaders.geometry.as_mut().or(evaluation);
-            let last = last.unwrap_or(&mut shaders.vertex);
-            carry_distances(last, &mut fragment);
-            let varyings = varyings(&last.interface, &fragment.interface);
-            shaders.fragment = Some(fragment);
-            varyings
-        }
-    };
+    let evaluation = shaders.tessellation.as_mut().map(|it| &mut it.evaluation);
+    let last = shaders.geometry.as_mut().or(evaluation);
+    let last = last.unwrap_or(&mut shaders.vertex);
+    let mut varyings = Varyings::new();
+    if let Some(fragment) = &mut shaders.fragment {
+        carry_distances(last, fragment);
+        varyings = varyings_read(&last.interface, &fragment.interface);
+    }
+    let read = varyings.len() as u32;
+    let captured = carry_captured(last, &mut varyings);
     let StageShaders {
         vertex,
         tessellation,
@@ -99,7 +98,8 @@ pub(crate) fn link(
     let none = Given::new();
     let of_last = of_evaluation.as_ref().or(of_vertices.as_ref());
     Ok(DrawPrograms {
-        varyings: varyings.len() as u32,
+        varyings: read,
+        captured,
         tessellation: tessellation.map(|shaders| {
             let given = of_vertices.as_ref().unwrap_or(&none);
             link_primitives::tessellation(shaders, given, |target| output(target, &of_evaluation))
@@ -172,6 +172,7 @@ fn vertex_programs(
         vertex_inputs,
         vertex_outputs,
         varyings: 0,
+        captured: None,
         tessellation: None,
         geometry: None,
         fragment: None,
@@ -242,6 +243,9 @@ fn check_widths(interface: &Interface) -> Result<(), Error> {
     Ok(())
 }
 
+/// The location, which no application can use, for outputs that are captured, each of which is a component.
+const LOCATION_OF_CAPTURED: u32 = u32::MAX - 2;
+
 /// The location, which no application can use, for a distance that is passed on as a varying.
 fn location_of_distance(built_in: BuiltIn) -> Option<u32> {
     match built_in {
@@ -275,38 +279,66 @@ fn carry_distances(vertex: &mut Shader, fragment: &mut Shader) {
             built_in,
             component,
         };
-        if gives_memory(&vertex.interface) {
-            carry_written(&mut vertex.interface, written, location, component);
-            continue;
-        }
-        let outputs = &mut vertex.interface.outputs;
-        let Some(slot) = outputs.iter().position(|output| output.target == written) else {
-            continue;
-        };
-        let mut program_outputs = vertex.program.outputs.iter();
-        let Some(reg) = program_outputs
-            .find(|output| output.slot as usize == slot)
-            .map(|output| output.reg)
-        else {
-            continue;
-        };
-        vertex.program.outputs.push(ProgramOutput {
-            slot: outputs.len() as u32,
-            reg,
-        });
-        outputs.push(Output {
-            target: OutputTarget::Location {
-                location,
-                component,
-                index: 0,
-            },
-            numeric: outputs[slot].numeric,
-        });
+        carry(vertex, written, (location, component));
     }
 }
 
+/// Makes varyings of the outputs that transform feedback captures. Those that are never written are not captured.
+fn carry_captured(last: &mut Shader, varyings: &mut Varyings) -> Option<CapturedOutputs> {
+    let feedback = last.interface.transform_feedback.take()?;
+    let first = varyings.len() as u32;
+    let mut captured = CapturedOutputs::default();
+    for (buffer, vertex) in captured.buffers.iter_mut().enumerate() {
+        vertex.stride = feedback.strides[buffer];
+        vertex.stream = feedback.streams[buffer];
+    }
+    for scalar in &feedback.scalars {
+        let place = (LOCATION_OF_CAPTURED, captured.varyings);
+        if carry(last, scalar.target, place).is_some() {
+            let value = CapturedValue {
+                offset: scalar.offset,
+                varying: first + captured.varyings,
+            };
+            varyings.insert(place, value.varying);
+            captured.varyings += 1;
+            captured.buffers[scalar.buffer as usize].values.push(value);
+        }
+    }
+    Some(captured)
+}
+
+/// Writes an output to a place as well. `None` if the stage never writes it.
+fn carry(
+    shader: &mut Shader,
+    written: OutputTarget,
+    (location, component): InterfaceComponent,
+) -> Option<()> {
+    let target = OutputTarget::Location {
+        location,
+        component,
+        index: 0,
+    };
+    if gives_memory(&shader.interface) {
+        return carry_written(&mut shader.interface, written, target);
+    }
+    let outputs = &mut shader.interface.outputs;
+    let slot = outputs.iter().position(|output| output.target == written)?;
+    let mut program_outputs = shader.program.outputs.iter();
+    let output = program_outputs.find(|output| output.slot as usize == slot)?;
+    let output = ProgramOutput {
+        slot: outputs.len() as u32,
+        reg: output.reg,
+    };
+    shader.program.outputs.push(output);
+    outputs.push(Output {
+        target,
+        numeric: outputs[slot].numeric,
+    });
+    Some(())
+}
+
 /// Numbers the components that the vertex stage writes and the fragment stage reads, in order.
-fn varyings(vertex: &Interface, fragment: &Interface) -> Varyings {
+fn varyings_read(vertex: &Interface, fragment: &Interface) -> Varyings {
     let mut components: Vec<InterfaceComponent> = components_read(fragment)
         .filter(|place| writes(vertex, *place))
         .collect();

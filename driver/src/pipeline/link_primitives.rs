@@ -156,25 +156,17 @@ pub(super) fn geometry(
     }
 }
 
-/// Makes varyings of clip and cull distances that a geometry stage writes and the fragment stage reads, at a location.
+/// Gives an output of a geometry stage a second target. `None` if the stage never writes it.
 pub(super) fn carry_written(
     interface: &mut Interface,
     written: OutputTarget,
-    location: u32,
-    component: u32,
-) {
+    target: OutputTarget,
+) -> Option<()> {
     let scalars = &mut interface.exchange.outputs.scalars;
     let found = scalars.iter().find(|scalar| scalar.target == written);
-    if let Some(scalar) = found.copied() {
-        scalars.push(MemoryScalar {
-            target: OutputTarget::Location {
-                location,
-                component,
-                index: 0,
-            },
-            ..scalar
-        });
-    }
+    let scalar = MemoryScalar { target, ..*found? };
+    scalars.push(scalar);
+    Some(())
 }
 
 /// The number of vertices of the primitives that a geometry stage takes.

@@ -104,6 +104,8 @@ pub(crate) struct PreRasterizationState<'a> {
     pub(crate) rasterization: vk::PipelineRasterizationStateCreateInfo<'a>,
     /// True if the provoking vertex is a primitive's last, not its first.
     pub(crate) provoking_last: bool,
+    /// The vertex stream that is rasterized.
+    pub(crate) rasterized_stream: u32,
     /// The number of vertices of a patch; 0 if the pipeline doesn't say.
     pub(crate) patch_control_points: u32,
     /// True if the origin of the domain of patches is the lower left.
@@ -206,6 +208,11 @@ impl<'a> GraphicsState<'a> {
                 gathered.pre_rasterization.provoking_last = provoking.is_some_and(|state| {
                     state.provoking_vertex_mode == vk::ProvokingVertexModeEXT::LAST_VERTEX
                 });
+                let stream = valid::find_in_chain::<
+                    vk::PipelineRasterizationStateStreamCreateInfoEXT<'_>,
+                >(state.p_next);
+                gathered.pre_rasterization.rasterized_stream =
+                    stream.map_or(0, |state| state.rasterization_stream);
             }
             if let Some(state) = valid::optional(info.p_rasterization_state) {
                 let clip = valid::find_in_chain::<
@@ -809,6 +816,7 @@ impl FixedFunctionState {
             depth_bias: None,
             line_width: info.line_width(),
             provoking_last: info.pre_rasterization.provoking_last,
+            rasterized_stream: info.pre_rasterization.rasterized_stream,
             lower_left_domain: info.pre_rasterization.lower_left_domain,
             samples: 1,
             sample_mask: u32::MAX,

@@ -390,6 +390,12 @@ pub(crate) struct Features {
     pub(crate) primitive_topology_list_restart: bool,
     /// `primitiveTopologyPatchListRestart`.
     pub(crate) primitive_topology_patch_list_restart: bool,
+    /// `primitivesGeneratedQuery`.
+    pub(crate) primitives_generated_query: bool,
+    /// `primitivesGeneratedQueryWithRasterizerDiscard`.
+    pub(crate) primitives_generated_query_with_rasterizer_discard: bool,
+    /// `primitivesGeneratedQueryWithNonZeroStreams`.
+    pub(crate) primitives_generated_query_with_non_zero_streams: bool,
     /// `provokingVertexLast`.
     pub(crate) provoking_vertex_last: bool,
     /// `transformFeedbackPreservesProvokingVertex`.
@@ -450,6 +456,10 @@ pub(crate) struct Features {
     pub(crate) sparse_image_float32_atomic_min_max: bool,
     /// `texelBufferAlignment`.
     pub(crate) texel_buffer_alignment: bool,
+    /// `transformFeedback`.
+    pub(crate) transform_feedback: bool,
+    /// `geometryStreams`.
+    pub(crate) geometry_streams: bool,
     /// `vertexAttributeInstanceRateDivisor`.
     pub(crate) vertex_attribute_instance_rate_divisor: bool,
     /// `vertexAttributeInstanceRateZeroDivisor`.
@@ -663,6 +673,7 @@ pub(crate) const SUPPORTED: Features = Features {
     extended_dynamic_state3_color_blend_enable: true,
     extended_dynamic_state3_color_blend_equation: true,
     extended_dynamic_state3_color_write_mask: true,
+    extended_dynamic_state3_rasterization_stream: true,
     extended_dynamic_state3_depth_clip_enable: true,
     extended_dynamic_state3_provoking_vertex_mode: true,
     extended_dynamic_state3_line_rasterization_mode: true,
@@ -676,7 +687,11 @@ pub(crate) const SUPPORTED: Features = Features {
     non_seamless_cube_map: true,
     primitive_topology_list_restart: true,
     primitive_topology_patch_list_restart: true,
+    primitives_generated_query: true,
+    primitives_generated_query_with_rasterizer_discard: true,
+    primitives_generated_query_with_non_zero_streams: true,
     provoking_vertex_last: true,
+    transform_feedback_preserves_provoking_vertex: true,
     robust_buffer_access2: true,
     robust_image_access2: true,
     null_descriptor: true,
@@ -690,6 +705,8 @@ pub(crate) const SUPPORTED: Features = Features {
     shader_shared_float32_atomic_min_max: true,
     shader_image_float32_atomic_min_max: true,
     texel_buffer_alignment: true,
+    transform_feedback: true,
+    geometry_streams: true,
     vertex_attribute_instance_rate_divisor: true,
     vertex_attribute_instance_rate_zero_divisor: true,
     vertex_input_dynamic_state: true,
@@ -922,6 +939,9 @@ impl Features {
         non_seamless_cube_map: false,
         primitive_topology_list_restart: false,
         primitive_topology_patch_list_restart: false,
+        primitives_generated_query: false,
+        primitives_generated_query_with_rasterizer_discard: false,
+        primitives_generated_query_with_non_zero_streams: false,
         provoking_vertex_last: false,
         transform_feedback_preserves_provoking_vertex: false,
         robust_buffer_access2: false,
@@ -952,6 +972,8 @@ impl Features {
         shader_image_float32_atomic_min_max: false,
         sparse_image_float32_atomic_min_max: false,
         texel_buffer_alignment: false,
+        transform_feedback: false,
+        geometry_streams: false,
         vertex_attribute_instance_rate_divisor: false,
         vertex_attribute_instance_rate_zero_divisor: false,
         vertex_input_dynamic_state: false,
@@ -992,7 +1014,7 @@ impl Features {
     };
 
     /// The features by their names.
-    pub(crate) fn list(&self) -> [(&'static str, bool); 257] {
+    pub(crate) fn list(&self) -> [(&'static str, bool); 262] {
         [
             ("robustBufferAccess", self.robust_buffer_access),
             ("fullDrawIndexUint32", self.full_draw_index_uint32),
@@ -1457,6 +1479,15 @@ impl Features {
                 "primitiveTopologyPatchListRestart",
                 self.primitive_topology_patch_list_restart,
             ),
+            ("primitivesGeneratedQuery", self.primitives_generated_query),
+            (
+                "primitivesGeneratedQueryWithRasterizerDiscard",
+                self.primitives_generated_query_with_rasterizer_discard,
+            ),
+            (
+                "primitivesGeneratedQueryWithNonZeroStreams",
+                self.primitives_generated_query_with_non_zero_streams,
+            ),
             ("provokingVertexLast", self.provoking_vertex_last),
             (
                 "transformFeedbackPreservesProvokingVertex",
@@ -1562,6 +1593,8 @@ impl Features {
                 self.sparse_image_float32_atomic_min_max,
             ),
             ("texelBufferAlignment", self.texel_buffer_alignment),
+            ("transformFeedback", self.transform_feedback),
+            ("geometryStreams", self.geometry_streams),
             (
                 "vertexAttributeInstanceRateDivisor",
                 self.vertex_attribute_instance_rate_divisor,
@@ -2231,6 +2264,16 @@ impl Features {
             out.primitive_topology_patch_list_restart =
                 self.primitive_topology_patch_list_restart.into();
         }
+        if let Some(out) =
+            structure.cast::<vk::PhysicalDevicePrimitivesGeneratedQueryFeaturesEXT<'_>>()
+        {
+            out.primitives_generated_query = self.primitives_generated_query.into();
+            out.primitives_generated_query_with_rasterizer_discard = self
+                .primitives_generated_query_with_rasterizer_discard
+                .into();
+            out.primitives_generated_query_with_non_zero_streams =
+                self.primitives_generated_query_with_non_zero_streams.into();
+        }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceProvokingVertexFeaturesEXT<'_>>() {
             out.provoking_vertex_last = self.provoking_vertex_last.into();
             out.transform_feedback_preserves_provoking_vertex =
@@ -2280,6 +2323,10 @@ impl Features {
         if let Some(out) = structure.cast::<vk::PhysicalDeviceTexelBufferAlignmentFeaturesEXT<'_>>()
         {
             out.texel_buffer_alignment = self.texel_buffer_alignment.into();
+        }
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceTransformFeedbackFeaturesEXT<'_>>() {
+            out.transform_feedback = self.transform_feedback.into();
+            out.geometry_streams = self.geometry_streams.into();
         }
         if let Some(out) =
             structure.cast::<vk::PhysicalDeviceVertexAttributeDivisorFeaturesKHR<'_>>()
@@ -2867,6 +2914,15 @@ impl Features {
                 requested.primitive_topology_patch_list_restart != vk::FALSE;
         }
         if let Some(requested) =
+            valid::cast::<vk::PhysicalDevicePrimitivesGeneratedQueryFeaturesEXT<'_>>(structure)
+        {
+            self.primitives_generated_query |= requested.primitives_generated_query != vk::FALSE;
+            self.primitives_generated_query_with_rasterizer_discard |=
+                requested.primitives_generated_query_with_rasterizer_discard != vk::FALSE;
+            self.primitives_generated_query_with_non_zero_streams |=
+                requested.primitives_generated_query_with_non_zero_streams != vk::FALSE;
+        }
+        if let Some(requested) =
             valid::cast::<vk::PhysicalDeviceProvokingVertexFeaturesEXT<'_>>(structure)
         {
             self.provoking_vertex_last |= requested.provoking_vertex_last != vk::FALSE;
@@ -2940,6 +2996,12 @@ impl Features {
             valid::cast::<vk::PhysicalDeviceTexelBufferAlignmentFeaturesEXT<'_>>(structure)
         {
             self.texel_buffer_alignment |= requested.texel_buffer_alignment != vk::FALSE;
+        }
+        if let Some(requested) =
+            valid::cast::<vk::PhysicalDeviceTransformFeedbackFeaturesEXT<'_>>(structure)
+        {
+            self.transform_feedback |= requested.transform_feedback != vk::FALSE;
+            self.geometry_streams |= requested.geometry_streams != vk::FALSE;
         }
         if let Some(requested) =
             valid::cast::<vk::PhysicalDeviceVertexAttributeDivisorFeaturesKHR<'_>>(structure)
@@ -3067,6 +3129,9 @@ pub(crate) fn extension_of(structure: vk::StructureType) -> Option<&'static CStr
         vk::PhysicalDevicePrimitiveTopologyListRestartFeaturesEXT::STRUCTURE_TYPE => {
             Some(c"VK_EXT_primitive_topology_list_restart")
         }
+        vk::PhysicalDevicePrimitivesGeneratedQueryFeaturesEXT::STRUCTURE_TYPE => {
+            Some(c"VK_EXT_primitives_generated_query")
+        }
         vk::PhysicalDeviceProvokingVertexFeaturesEXT::STRUCTURE_TYPE => {
             Some(c"VK_EXT_provoking_vertex")
         }
@@ -3079,6 +3144,9 @@ pub(crate) fn extension_of(structure: vk::StructureType) -> Option<&'static CStr
         }
         vk::PhysicalDeviceTexelBufferAlignmentFeaturesEXT::STRUCTURE_TYPE => {
             Some(c"VK_EXT_texel_buffer_alignment")
+        }
+        vk::PhysicalDeviceTransformFeedbackFeaturesEXT::STRUCTURE_TYPE => {
+            Some(c"VK_EXT_transform_feedback")
         }
         vk::PhysicalDeviceVertexAttributeDivisorFeaturesKHR::STRUCTURE_TYPE => {
             Some(c"VK_EXT_vertex_attribute_divisor")

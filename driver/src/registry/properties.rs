@@ -486,6 +486,26 @@ pub(crate) struct Properties {
     pub(crate) robust_storage_buffer_access_size_alignment: vk::DeviceSize,
     /// `robustUniformBufferAccessSizeAlignment`.
     pub(crate) robust_uniform_buffer_access_size_alignment: vk::DeviceSize,
+    /// `maxTransformFeedbackStreams`.
+    pub(crate) max_transform_feedback_streams: u32,
+    /// `maxTransformFeedbackBuffers`.
+    pub(crate) max_transform_feedback_buffers: u32,
+    /// `maxTransformFeedbackBufferSize`.
+    pub(crate) max_transform_feedback_buffer_size: vk::DeviceSize,
+    /// `maxTransformFeedbackStreamDataSize`.
+    pub(crate) max_transform_feedback_stream_data_size: u32,
+    /// `maxTransformFeedbackBufferDataSize`.
+    pub(crate) max_transform_feedback_buffer_data_size: u32,
+    /// `maxTransformFeedbackBufferDataStride`.
+    pub(crate) max_transform_feedback_buffer_data_stride: u32,
+    /// `transformFeedbackQueries`.
+    pub(crate) transform_feedback_queries: bool,
+    /// `transformFeedbackStreamsLinesTriangles`.
+    pub(crate) transform_feedback_streams_lines_triangles: bool,
+    /// `transformFeedbackRasterizationStreamSelect`.
+    pub(crate) transform_feedback_rasterization_stream_select: bool,
+    /// `transformFeedbackDraw`.
+    pub(crate) transform_feedback_draw: bool,
     /// `maxVertexAttribDivisor`.
     pub(crate) max_vertex_attrib_divisor: u32,
     /// `tileSize`.
@@ -1141,6 +1161,24 @@ impl Properties {
                 self.robust_storage_buffer_access_size_alignment;
             out.robust_uniform_buffer_access_size_alignment =
                 self.robust_uniform_buffer_access_size_alignment;
+        }
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceTransformFeedbackPropertiesEXT<'_>>()
+        {
+            out.max_transform_feedback_streams = self.max_transform_feedback_streams;
+            out.max_transform_feedback_buffers = self.max_transform_feedback_buffers;
+            out.max_transform_feedback_buffer_size = self.max_transform_feedback_buffer_size;
+            out.max_transform_feedback_stream_data_size =
+                self.max_transform_feedback_stream_data_size;
+            out.max_transform_feedback_buffer_data_size =
+                self.max_transform_feedback_buffer_data_size;
+            out.max_transform_feedback_buffer_data_stride =
+                self.max_transform_feedback_buffer_data_stride;
+            out.transform_feedback_queries = self.transform_feedback_queries.into();
+            out.transform_feedback_streams_lines_triangles =
+                self.transform_feedback_streams_lines_triangles.into();
+            out.transform_feedback_rasterization_stream_select =
+                self.transform_feedback_rasterization_stream_select.into();
+            out.transform_feedback_draw = self.transform_feedback_draw.into();
         }
         if let Some(out) =
             structure.cast::<vk::PhysicalDeviceVertexAttributeDivisorPropertiesEXT<'_>>()

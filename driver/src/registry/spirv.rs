@@ -399,8 +399,12 @@ pub(crate) fn enables(capability: Capability) -> &'static [Enable] {
         Capability::RayCullMaskKHR => &[Enable::Absent("rayTracingMaintenance1")],
         Capability::RayTracingNV => &[Enable::Absent("VK_NV_ray_tracing")],
         Capability::RayTracingMotionBlurNV => &[Enable::Absent("rayTracingMotionBlur")],
-        Capability::TransformFeedback => &[Enable::Absent("transformFeedback")],
-        Capability::GeometryStreams => &[Enable::Absent("geometryStreams")],
+        Capability::TransformFeedback => &[Enable::Feature("transformFeedback", |f| {
+            f.transform_feedback
+        })],
+        Capability::GeometryStreams => {
+            &[Enable::Feature("geometryStreams", |f| f.geometry_streams)]
+        }
         Capability::FragmentDensityEXT => &[
             Enable::Absent("fragmentDensityMap"),
             Enable::Absent("shadingRateImage"),

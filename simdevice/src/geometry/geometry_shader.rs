@@ -5,6 +5,7 @@ use super::pieces::Pieces;
 use super::primitive_list::{ListedPrimitive, PrimitiveList};
 use super::primitive_stage::{ENOUGH_VERTICES, Environment, StageRunner};
 use super::shade::{OutputReader, Shaded, Vertices};
+use crate::limits::MAX_VERTEX_STREAMS;
 use crate::program::interface::PrimitiveInput;
 use crate::program::primitive::GeometryStage;
 use crate::state::Topology;
@@ -24,6 +25,8 @@ pub(super) struct GeometryShader<'a> {
     columns: Vec<Vec<Vector>>,
     shaded: Shaded,
     listed: Vec<ListedPrimitive>,
+    /// The slots of the current strip of each vertex stream.
+    strips: [Vec<u32>; MAX_VERTEX_STREAMS],
 }
 
 impl<'a> GeometryShader<'a> {
@@ -42,6 +45,7 @@ impl<'a> GeometryShader<'a> {
             columns: vec![Vec::new(); stage.gives.values.len()],
             shaded: Shaded::default(),
             listed: Vec::new(),
+            strips: Default::default(),
         }
     }
 
@@ -109,15 +113,14 @@ impl<'a> GeometryShader<'a> {
         for lane in 0..lanes {
             let count = self.runner.machine.output(self.stage.count, lane);
             let id = primitives.ids[(first + lane) / self.stage.invocations];
-            let mut strip = slot_before + vertices;
+            self.strips.iter_mut().for_each(Vec::clear);
             for number in 0..count {
                 let start =
                     gives.start + lane as u32 * gives.stride + number * vertex_bytes.unwrap_or(0);
                 let slot = slot_before + vertices;
-                if self.runner.given(start) != 0 {
-                    strip = slot;
-                }
-                self.list(strip, slot, id);
+                let header = self.runner.given(start);
+                let (begins, stream) = (header & 1 != 0, header >> 1);
+                self.list(stream, begins, slot, id);
                 let place = vertices as usize;
                 for (column, value) in self.columns.iter_mut().zip(&gives.values) {
                     if place.is_multiple_of(16) {
@@ -135,23 +138,30 @@ impl<'a> GeometryShader<'a> {
             .take(vertices as usize, column, &mut self.shaded);
     }
 
-    /// Lists the primitive that a vertex of a strip completes, if there is one.
-    fn list(&mut self, strip: u32, slot: u32, id: u32) {
+    /// Adds a vertex to the strip of a stream, and lists the primitive that it completes, if there is one.
+    fn list(&mut self, stream: u32, begins_strip: bool, slot: u32, id: u32) {
+        let Some(strip) = self.strips.get_mut(stream as usize) else {
+            return;
+        };
+        if begins_strip {
+            strip.clear();
+        }
+        strip.push(slot);
         let topology = match self.stage.corners {
             1 => Topology::PointList,
             2 => Topology::LineStrip,
             _ => Topology::TriangleStrip,
         };
-        let (vertices, others) = (slot - strip, self.stage.corners as u32 - 1);
-        let Some(number) = vertices.checked_sub(others) else {
+        let Some(number) = strip.len().checked_sub(self.stage.corners) else {
             return;
         };
-        let found = corners(topology, self.provoking_last, number);
-        let slots = found.places.map(|place| strip + place);
+        let found = corners(topology, self.provoking_last, number as u32);
+        let slots = found.places.map(|place| strip[place as usize]);
         let primitive = ListedPrimitive {
             slots,
             provoking: slots[found.provoking],
             id,
+            stream,
         };
         host::push(&mut self.listed, primitive);
     }

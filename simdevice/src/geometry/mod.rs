@@ -8,10 +8,11 @@
 //! of two segments are shaded in both.
 //!
 //! Tessellation and geometry programs ([`tessellation_shader`], [`geometry_shader`]) take the assembled primitives and
-//! leave others ([`primitive_list`]), which are set up in pieces.
+//! leave others ([`primitive_list`]), which are set up in pieces. Transform feedback [`capture`]s what is set up.
 
 mod assemble;
 mod bins;
+mod capture;
 mod clip;
 mod depth_bias;
 mod draw;
@@ -46,6 +47,7 @@ use crate::state::{PolygonMode, Rect};
 use crate::stats::counters::{Counter, Counters};
 use assemble::corner_count;
 use bins::Grid;
+use capture::Capture;
 use depth_bias::DepthUnit;
 use devmem::host;
 use fetch::Fetcher;
@@ -53,6 +55,7 @@ use isa::ir::Rate;
 use isa::machine::{Stopped, Watchdog};
 use isa::resources::Resources;
 use pieces::Pieces;
+use primitive_list::{ListedPrimitive, list_corners};
 use primitive_stage::Environment;
 use primitive_stages::{PrimitiveStages, StageBindings, StageResources};
 use setup::Setup;
@@ -113,6 +116,8 @@ pub(crate) struct FrontEnd<'a> {
     next: u64,
     /// The number of primitives that tessellation has made of the instance, if their numbers are read.
     presented: Option<AtomicU32>,
+    /// The capture by transform feedback, if it is active.
+    capture: Option<Capture<'a>>,
 }
 
 impl<'a> FrontEnd<'a> {
@@ -172,6 +177,7 @@ impl<'a> FrontEnd<'a> {
             segments,
             next: 0,
             presented: draw.pipeline.numbers_primitives().then(AtomicU32::default),
+            capture: Capture::new(draw, corners_drawn(draw)),
         }
     }
 
@@ -184,7 +190,7 @@ impl<'a> FrontEnd<'a> {
             return Ok(None);
         }
         let started = Instant::now();
-        let done = if self.segment == SEGMENT {
+        let done = if self.segment == SEGMENT && self.capture.is_none() {
             let range = self.next..self.segments.min(self.next + PART_SEGMENTS);
             self.next = range.end;
             self.process(range, counters)
@@ -247,14 +253,22 @@ impl<'a> FrontEnd<'a> {
             Worker::run_segment,
         );
         ran?;
-        let mut done = Vec::new();
+        let (mut done, mut captured) = (Vec::new(), Vec::new());
         for worker in workers {
             let finished = worker.finished;
             counters.add_all(&finished.counters);
             host::reserve(&mut done, finished.segments.len());
             done.extend(finished.segments);
+            host::reserve(&mut captured, finished.captured.len());
+            captured.extend(finished.captured);
         }
         done.sort_unstable_by_key(|(place, _)| *place);
+        if let Some(capture) = &self.capture {
+            captured.sort_unstable_by_key(|(place, _)| *place);
+            for (_, primitives) in &captured {
+                capture.write(primitives, counters);
+            }
+        }
         Ok(host::collect(done.into_iter().map(|(_, segment)| segment)))
     }
 
@@ -330,6 +344,8 @@ struct Worker<'a> {
     /// The programs that make other primitives.
     stages: Option<PrimitiveStages<'a>>,
     finished: Pieces<'a>,
+    /// The primitives of a segment, if they are captured.
+    listed: Vec<ListedPrimitive>,
 }
 
 impl<'a> Worker<'a> {
@@ -375,7 +391,8 @@ impl<'a> Worker<'a> {
             reuse: VertexReuse::default(),
             shaded: Shaded::default(),
             stages: PrimitiveStages::new(front.draw, &reader, stage_resources, environment),
-            finished: Pieces::new(setup),
+            finished: Pieces::new(setup, front.capture),
+            listed: Vec::new(),
         }
     }
 
@@ -396,6 +413,18 @@ impl<'a> Worker<'a> {
         if let Some(stages) = &mut self.stages {
             return stages.run(reuse, &self.shaded, segment, finished);
         }
+        if front.capture.is_some() {
+            let state = &front.draw.state;
+            list_corners(
+                state.topology,
+                state.provoking_last,
+                reuse,
+                &mut self.listed,
+            );
+            finished.set_up(&self.shaded, &self.listed, (segment, 0));
+            return Ok(());
+        }
+        counters.add(Counter::PrimitivesOfStream0, reuse.primitives());
         if finished.discards {
             counters.add(Counter::ClippingInvocations, reuse.primitives());
             return Ok(());

@@ -1,6 +1,7 @@
 //! Set-up and binning of a worker's primitives, piece by piece.
 
 use super::bins::Bins;
+use super::capture::{Capture, CapturedPrimitives};
 use super::draw::PrimitiveSegment;
 use super::order;
 use super::primitive::Varyings;
@@ -19,18 +20,23 @@ pub(super) struct Pieces<'a> {
     numbers: Vec<u32>,
     output: Output,
     pub counters: Counters,
+    capture: Option<Capture<'a>>,
+    /// What transform feedback captured of the pieces, with the numbers of their segments and of the pieces in these.
+    pub captured: Vec<((u64, u32), CapturedPrimitives)>,
     /// The pieces that have primitives, with the numbers of their segments and of the pieces in these.
     pub segments: Vec<((u64, u32), PrimitiveSegment)>,
 }
 
 impl<'a> Pieces<'a> {
-    pub(super) fn new(setup: &'a Setup<'a>) -> Self {
+    pub(super) fn new(setup: &'a Setup<'a>, capture: Option<Capture<'a>>) -> Self {
         Self {
             setup,
             discards: setup.state.rasterizer_discard || setup.transforms.is_empty(),
             numbers: Vec::new(),
             output: Output::default(),
             counters: Counters::default(),
+            capture,
+            captured: Vec::new(),
             segments: Vec::new(),
         }
     }
@@ -41,19 +47,29 @@ impl<'a> Pieces<'a> {
         SegmentSetup::new(self.setup, shaded, &mut self.numbers, &mut self.output)
     }
 
-    /// Sets up primitives that programs made.
+    /// Captures listed primitives, and sets up those of the vertex stream that is rasterized.
     pub(super) fn set_up(
         &mut self,
         shaded: &Shaded,
         primitives: &[ListedPrimitive],
         place: (u64, u32),
     ) {
+        for (stream, &counter) in (0..).zip(&Counter::PRIMITIVES_OF_STREAMS) {
+            let of_stream = primitives.iter().filter(|it| it.stream == stream);
+            self.counters.add(counter, of_stream.count() as u64);
+        }
+        if let Some(capture) = self.capture {
+            let captured = capture.take(shaded, primitives);
+            host::push(&mut self.captured, (place, captured));
+        }
+        let stream = self.setup.state.rasterized_stream;
+        let rasterized = primitives.iter().filter(|it| it.stream == stream);
         if self.discards {
-            let count = primitives.len() as u64;
+            let count = rasterized.count() as u64;
             self.counters.add(Counter::ClippingInvocations, count);
             return;
         }
-        self.begin(shaded).run_list(primitives);
+        self.begin(shaded).run_list(rasterized);
         self.keep(place);
     }
 
@@ -68,7 +84,7 @@ impl<'a> Pieces<'a> {
         }
         let started = Instant::now();
         let mut bins = Bins::new(&setup.grid, setup.layers, &output.pairs);
-        let per_vertex = setup.outputs.varyings.len();
+        let per_vertex = setup.outputs.interpolation.len();
         let (primitives, values) = order::in_order(output, per_vertex, &mut bins, order::FEW);
         counters.add(Counter::BinnedPairs, bins.pairs());
         let elapsed = started.elapsed().as_nanos() as u64;

@@ -1,4 +1,4 @@
-//! Lists of primitives: those that tessellation and geometry programs take, and those that are left for set-up.
+//! Lists of primitives: those that tessellation and geometry programs take, and those that are set up.
 
 use super::assemble;
 use super::vertex_reuse::VertexReuse;
@@ -25,6 +25,31 @@ pub(super) struct ListedPrimitive {
     pub provoking: u32,
     /// Its number.
     pub id: u32,
+    /// The vertex stream that it belongs to.
+    pub stream: u32,
+}
+
+/// Lists the primitives of a segment for set-up, if there are no programs that take them.
+pub(super) fn list_corners(
+    topology: Topology,
+    provoking_last: bool,
+    reuse: &VertexReuse,
+    into: &mut Vec<ListedPrimitive>,
+) {
+    into.clear();
+    for piece in &reuse.pieces {
+        for number in piece.first..piece.end {
+            let found = assemble::corners(topology, provoking_last, number);
+            let slots = found.places.map(|place| reuse.slot(piece, place));
+            let primitive = ListedPrimitive {
+                slots,
+                provoking: slots[found.provoking],
+                id: piece.primitives_before.wrapping_add(number),
+                stream: 0,
+            };
+            host::push(into, primitive);
+        }
+    }
 }
 
 impl PrimitiveList {
@@ -75,6 +100,7 @@ impl PrimitiveList {
                 slots: [first, corner(1), corner(2)],
                 provoking: if provoking_last { last } else { first },
                 id,
+                stream: 0,
             };
             host::push(into, primitive);
         }

@@ -142,8 +142,8 @@ impl<'a> SegmentSetup<'a> {
         }
     }
 
-    /// Sets up primitives that programs made.
-    pub(super) fn run_list(mut self, primitives: &[ListedPrimitive]) {
+    /// Sets up listed primitives.
+    pub(super) fn run_list<'p>(mut self, primitives: impl Iterator<Item = &'p ListedPrimitive>) {
         let names_primitives = self.setup.outputs.primitive_id.is_some();
         for primitive in primitives {
             let mut current = AssembledPrimitive {
@@ -160,8 +160,8 @@ impl<'a> SegmentSetup<'a> {
             };
             self.choose_target(&mut current);
             self.primitive(self.setup.corners, &mut current);
+            self.out.assembled += 1;
         }
-        self.out.assembled += primitives.len() as u64;
     }
 
     /// Sets up a primitive of `corners` corners.
@@ -601,8 +601,8 @@ impl SegmentSetup<'_> {
         if self.numbers[slot] == NONE {
             self.numbers[slot] = self.out.vertices;
             self.out.vertices += 1;
-            let per_vertex = self.setup.outputs.varyings.len();
-            let varyings = &self.shaded.varyings[slot * per_vertex..][..per_vertex];
+            let read = self.setup.outputs.interpolation.len();
+            let varyings = &self.shaded.varyings[slot * self.shaded.per_vertex..][..read];
             host::extend(&mut self.out.varyings, varyings);
         }
         self.numbers[slot]
@@ -625,9 +625,7 @@ impl SegmentSetup<'_> {
         let sum: f64 = linear.iter().sum();
         let linear = linear.map(|weight| weight / sum);
         let interpolation = &self.setup.outputs.interpolation;
-        let per_vertex = interpolation.len();
-        let of =
-            |slot: u32, varying: usize| self.shaded.varyings[slot as usize * per_vertex + varying];
+        let of = |slot: u32, varying: usize| self.shaded.values().vertex(slot)[varying];
         for (varying, interpolation) in interpolation.iter().enumerate() {
             let mix = |weights: [f64; 3]| {
                 let part = |corner: usize| {

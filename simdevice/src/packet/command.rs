@@ -12,6 +12,7 @@ use super::{
     Rendering,
 };
 use crate::stats::query::QueryPool;
+use crate::transform_feedback::{CounterWords, TransformFeedback};
 use devmem::BufferRange;
 use std::fmt;
 use std::fmt::{Display, Formatter};
@@ -86,6 +87,21 @@ pub enum Packet {
         pool: Arc<QueryPool>,
         /// The query's index in it.
         index: u32,
+    },
+    /// Makes transform feedback active, for the draws that name it.
+    BeginTransformFeedback {
+        /// The transform feedback.
+        feedback: Arc<TransformFeedback>,
+        /// The words from which the numbers of bytes that are written already are read, by buffer. Without one, a buffer
+        /// is written from its beginning.
+        counters: CounterWords,
+    },
+    /// Ends transform feedback.
+    EndTransformFeedback {
+        /// The transform feedback.
+        feedback: Arc<TransformFeedback>,
+        /// The words to which the numbers of bytes that have been written are stored, by buffer.
+        counters: CounterWords,
     },
     /// Makes `count` queries from `first` on unavailable.
     ResetQueries {
@@ -189,6 +205,8 @@ impl Display for Packet {
             Self::Draw(it) => write!(f, "{}", draw(it)),
             Self::Barrier => f.write_str("barrier"),
             Self::EndRendering => f.write_str("end rendering"),
+            Self::BeginTransformFeedback { .. } => f.write_str("begin transform feedback"),
+            Self::EndTransformFeedback { .. } => f.write_str("end transform feedback"),
             Self::BeginQuery { index, .. } => write!(f, "begin query {index}"),
             Self::EndQuery { index, .. } => write!(f, "end query {index}"),
             Self::ResetQueries { first, count, .. } => {

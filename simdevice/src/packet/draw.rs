@@ -7,6 +7,7 @@ use crate::program::fragment::GaussianFragmentProgram;
 use crate::program::vertex::DrawPipeline;
 use crate::state::gaussian::{Camera, GaussianState};
 use crate::state::{DrawState, Rect, Viewport};
+use crate::transform_feedback::TransformFeedback;
 use devmem::{BufferRange, host};
 use std::sync::Arc;
 
@@ -142,6 +143,8 @@ pub struct Draw {
     pub instance_count: u32,
     /// The draw's number within an indirect command.
     pub draw_index: u32,
+    /// The transform feedback that captures the draw's primitives, if it is active.
+    pub transform_feedback: Option<Arc<TransformFeedback>>,
 }
 
 /// The bindings of the programs between the vertex and the fragment program.

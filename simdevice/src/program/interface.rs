@@ -1,5 +1,6 @@
 //! The interfaces of programs: the meanings of the slots of their inputs and outputs.
 
+use crate::limits::MAX_TRANSFORM_FEEDBACK_BUFFERS;
 use crate::tessellation::Tessellation;
 use isa::ir::Program;
 
@@ -51,14 +52,52 @@ pub struct DrawPrograms {
     pub vertex_inputs: Vec<Option<VertexInput>>,
     /// The meanings of its outputs, by slot; `None` is not used.
     pub vertex_outputs: Vec<Option<VertexOutput>>,
-    /// The number of varyings, each a 32-bit scalar.
+    /// The number of varyings that the fragment stage reads, each a 32-bit scalar.
     pub varyings: u32,
+    /// The outputs of the last stage before rasterization that transform feedback writes.
+    pub captured: Option<CapturedOutputs>,
     /// The tessellation stages.
     pub tessellation: Option<TessellationPrograms>,
     /// The geometry stage.
     pub geometry: Option<GeometryPrograms>,
     /// The fragment stage. Without one only depth and stencil are written.
     pub fragment: Option<FragmentPrograms>,
+}
+
+impl DrawPrograms {
+    /// The number of varyings that the fragment stage reads: none if there is no such stage.
+    pub(crate) fn varyings_read(&self) -> u32 {
+        self.fragment.as_ref().map_or(0, |_| self.varyings)
+    }
+}
+
+/// The outputs that transform feedback writes, by buffer.
+#[derive(Clone, Debug, Default)]
+pub struct CapturedOutputs {
+    /// The number of varyings that are written. Their numbers follow those of the varyings that the fragment stage reads.
+    pub varyings: u32,
+    /// The buffers.
+    pub buffers: [CapturedVertex; MAX_TRANSFORM_FEEDBACK_BUFFERS],
+}
+
+/// The layout of a vertex in a buffer of transform feedback.
+#[derive(Clone, Debug, Default)]
+pub struct CapturedVertex {
+    /// The bytes from one vertex to the next; 0 if the buffer is not written.
+    pub stride: u32,
+    /// The stream of the vertices.
+    pub stream: u32,
+    /// The values in the order of their offsets. Bytes between them are not written.
+    pub values: Vec<CapturedValue>,
+}
+
+/// A 32-bit value of a vertex in a buffer of transform feedback.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CapturedValue {
+    /// The first byte within the vertex, a multiple of 4.
+    pub offset: u32,
+    /// The number of the varying.
+    pub varying: u32,
 }
 
 /// A program that takes vertices of primitives or patches from the stage before. The outputs of a vertex program that
@@ -129,7 +168,8 @@ pub struct GeometryPrograms {
     pub invocations: u32,
     /// The slot of the output that counts a lane's vertices.
     pub count: u32,
-    /// The vertices that it gives. Each begins with a word that is 1 if the vertex is the first of a strip.
+    /// The vertices that it gives. Each begins with a word: bit 0 is 1 if the vertex is the first of a strip, and the
+    /// bits above are the number of its stream.
     pub gives: VertexMemory,
     /// The meanings of the values that it gives; `None` is not used.
     pub outputs: Vec<Option<VertexOutput>>,

@@ -13,9 +13,9 @@ pub(crate) struct VertexOutputs {
     pub layer: Option<u32>,
     pub viewport: Option<u32>,
     pub primitive_id: Option<u32>,
-    /// The slots, by number of the varying. Only varyings that a fragment stage may read are included.
+    /// The slots, by number of the varying. Only varyings that a later stage may read or that are captured are included.
     pub varyings: Vec<Option<u32>>,
-    /// The interpolation, by number of the varying.
+    /// The interpolation of the varyings that the fragment stage reads, by number.
     pub interpolation: Vec<Interpolation>,
 }
 
@@ -29,7 +29,7 @@ impl VertexOutputs {
     ) -> Self {
         let mut this = Self {
             varyings: vec![None; varyings as usize],
-            interpolation: vec![Interpolation::Flat; varyings as usize],
+            interpolation: vec![Interpolation::Flat; programs.varyings_read() as usize],
             ..Self::default()
         };
         let fragment_inputs = programs.fragment.iter().flat_map(|stage| &stage.inputs);

@@ -5,7 +5,7 @@ use super::pool::MachinePool;
 use crate::limits::DRAW_SUBGROUP_SIZE;
 use crate::program::fragment::FragmentStage;
 use crate::program::interface::{
-    DrawPrograms, FragmentInput, PrimitiveInput, PrimitiveProgram, VertexInput,
+    CapturedOutputs, DrawPrograms, FragmentInput, PrimitiveInput, PrimitiveProgram, VertexInput,
 };
 use crate::program::primitive::{GeometryStage, TessellationStage};
 use fearless_simd::Level;
@@ -27,6 +27,8 @@ pub struct DrawPipeline {
     pub(crate) geometry: Option<GeometryStage>,
     /// The fragment program.
     pub(crate) fragment: Option<FragmentStage>,
+    /// The outputs that transform feedback writes.
+    pub(crate) captured: Option<CapturedOutputs>,
 }
 
 /// The vertex program, and the meanings of its slots.
@@ -43,8 +45,8 @@ impl DrawPipeline {
     /// # Errors
     /// [`InvalidProgram`] if one of them cannot run on the device.
     pub fn new(level: Level, programs: &DrawPrograms) -> Result<Self, InvalidProgram> {
-        // Without a fragment stage, varyings are not read.
-        let varyings = programs.fragment.as_ref().map_or(0, |_| programs.varyings);
+        let captured = programs.captured.as_ref().map_or(0, |it| it.varyings);
+        let varyings = programs.varyings_read() + captured;
         let control = programs.tessellation.as_ref().map(|it| &it.control);
         let geometry = programs.geometry.as_ref().map(|it| &it.program);
         // The stage after a stage reads its varyings.
@@ -69,6 +71,7 @@ impl DrawPipeline {
             tessellation: tessellation.transpose()?,
             geometry: geometry.transpose()?,
             fragment,
+            captured: programs.captured.clone(),
         })
     }
 
@@ -107,6 +110,7 @@ impl DrawPipeline {
             tessellation: None,
             geometry: None,
             fragment: None,
+            captured: None,
         })
     }
 }

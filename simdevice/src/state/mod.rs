@@ -307,6 +307,8 @@ pub struct DrawState {
     pub line_width: f32,
     /// True if the provoking vertex is the last; else it is the first.
     pub provoking_last: bool,
+    /// The vertex stream that is rasterized.
+    pub rasterized_stream: u32,
     /// True if the origin of the domain of patches is the lower left, which exchanges the orders of vertices.
     pub lower_left_domain: bool,
     /// The samples per pixel of the pass: 1 or 4.
@@ -363,6 +365,7 @@ impl DrawState {
             depth_bias: None,
             line_width: 1.0,
             provoking_last: false,
+            rasterized_stream: 0,
             lower_left_domain: false,
             samples: 1,
             sample_mask: u32::MAX,

@@ -1,6 +1,7 @@
 //! Counters of the device's work. They are summed from a command processor's creation on. A query reads the difference
 //! between the values at its end and at its beginning.
 
+use crate::limits::MAX_VERTEX_STREAMS;
 use isa::machine::Work;
 use isa::op::Kind;
 
@@ -100,6 +101,18 @@ counters! {
     ClippingPrimitives: "geometry", "clipping primitives", Count, "Primitives that clipping left, as it cut them";
     PrimitivesDrawn: "geometry", "primitives drawn", Count, "Primitives that were not culled and may cover a sample";
     BinnedPairs: "geometry", "binned pairs", Count, "Pairs of a macro-tile and a primitive that may touch it";
+    PrimitivesOfStream0: "transform feedback", "primitives of stream 0", Count, "Primitives of vertex stream 0 that the last program before rasterization made";
+    PrimitivesOfStream1: "transform feedback", "primitives of stream 1", Count, "Primitives of vertex stream 1 that the last program before rasterization made";
+    PrimitivesOfStream2: "transform feedback", "primitives of stream 2", Count, "Primitives of vertex stream 2 that the last program before rasterization made";
+    PrimitivesOfStream3: "transform feedback", "primitives of stream 3", Count, "Primitives of vertex stream 3 that the last program before rasterization made";
+    CaptureNeeded0: "transform feedback", "to capture of stream 0", Count, "Primitives of vertex stream 0 that were made while transform feedback was active";
+    CaptureNeeded1: "transform feedback", "to capture of stream 1", Count, "Primitives of vertex stream 1 that were made while transform feedback was active";
+    CaptureNeeded2: "transform feedback", "to capture of stream 2", Count, "Primitives of vertex stream 2 that were made while transform feedback was active";
+    CaptureNeeded3: "transform feedback", "to capture of stream 3", Count, "Primitives of vertex stream 3 that were made while transform feedback was active";
+    Captured0: "transform feedback", "captured of stream 0", Count, "Primitives of vertex stream 0 that transform feedback wrote to buffers";
+    Captured1: "transform feedback", "captured of stream 1", Count, "Primitives of vertex stream 1 that transform feedback wrote to buffers";
+    Captured2: "transform feedback", "captured of stream 2", Count, "Primitives of vertex stream 2 that transform feedback wrote to buffers";
+    Captured3: "transform feedback", "captured of stream 3", Count, "Primitives of vertex stream 3 that transform feedback wrote to buffers";
     TilePairs: "raster", "tile pairs", Count, "Pairs of a 16x16 tile and a Gaussian that reaches a pixel centre's rectangle of it";
     TilePairsEvaluated: "raster", "tile pairs evaluated", Count, "Tile pairs that were fetched before their tile was saturated";
     BlockEvaluations: "raster", "block evaluations", Count, "Pairs of a 4x4 block and a Gaussian whose alpha was evaluated";
@@ -157,6 +170,30 @@ counters! {
 }
 
 impl Counter {
+    /// The primitives of each vertex stream.
+    pub const PRIMITIVES_OF_STREAMS: [Self; MAX_VERTEX_STREAMS] = [
+        Self::PrimitivesOfStream0,
+        Self::PrimitivesOfStream1,
+        Self::PrimitivesOfStream2,
+        Self::PrimitivesOfStream3,
+    ];
+
+    /// Those of each vertex stream that transform feedback had to write.
+    pub const CAPTURE_NEEDED: [Self; MAX_VERTEX_STREAMS] = [
+        Self::CaptureNeeded0,
+        Self::CaptureNeeded1,
+        Self::CaptureNeeded2,
+        Self::CaptureNeeded3,
+    ];
+
+    /// Those of each vertex stream that transform feedback wrote.
+    pub const CAPTURED: [Self; MAX_VERTEX_STREAMS] = [
+        Self::Captured0,
+        Self::Captured1,
+        Self::Captured2,
+        Self::Captured3,
+    ];
+
     /// True if the counter needs a model of the hardware to run.
     pub fn is_simulated(self) -> bool {
         self as usize >= Self::SimulatedTime as usize

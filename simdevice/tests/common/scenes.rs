@@ -207,6 +207,7 @@ fn shaded(device: &Device, seed: u64, count: u32) -> Vec<Packet> {
         vertex_inputs: inputs.collect(),
         vertex_outputs: position.chain(others).collect(),
         varyings: gaussian::VARYINGS,
+        captured: None,
         tessellation: None,
         geometry: None,
         fragment: None,
@@ -258,6 +259,7 @@ fn shaded(device: &Device, seed: u64, count: u32) -> Vec<Packet> {
             first_instance: 0,
             instance_count: 1,
             draw_index: 0,
+            transform_feedback: None,
         })),
         Packet::GaussianEnd,
     ]
@@ -311,6 +313,7 @@ fn triangles(device: &Device, seed: u64, count: u32) -> Packet {
             .chain((0..4).map(|number| Some(VertexOutput::Varying(number))))
             .collect(),
         varyings: 4,
+        captured: None,
         tessellation: None,
         geometry: None,
         fragment: Some(FragmentPrograms {
@@ -347,5 +350,6 @@ fn triangles(device: &Device, seed: u64, count: u32) -> Packet {
         first_instance: 0,
         instance_count: 1,
         draw_index: 0,
+        transform_feedback: None,
     }))
 }

@@ -91,6 +91,7 @@ fn programs() -> DrawPrograms {
         vertex_inputs: attribute(0).chain(attribute(1)).collect(),
         vertex_outputs: positions.chain(varyings).collect(),
         varyings: 4,
+        captured: None,
         tessellation: None,
         geometry: None,
         fragment: Some(FragmentPrograms {
@@ -377,6 +378,7 @@ impl Player {
             first_instance: 0,
             instance_count: 1,
             draw_index: 0,
+            transform_feedback: None,
         }))
     }
 }

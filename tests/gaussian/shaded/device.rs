@@ -67,6 +67,7 @@ pub fn triangle(device: &Device, samples: u32) -> Draw {
             .map(|axis| Some(VertexOutput::Position(axis)))
             .collect(),
         varyings: 0,
+        captured: None,
         tessellation: None,
         geometry: None,
         fragment: None,
@@ -106,6 +107,7 @@ pub fn triangle(device: &Device, samples: u32) -> Draw {
         first_instance: 0,
         instance_count: 1,
         draw_index: 0,
+        transform_feedback: None,
     }
 }
 
@@ -150,6 +152,7 @@ fn pipeline(device: &Device, with_key: bool) -> Arc<DrawPipeline> {
             .chain((0..gaussian::VARYINGS).map(varying))
             .collect(),
         varyings,
+        captured: None,
         tessellation: None,
         geometry: None,
         fragment: None,
@@ -221,6 +224,7 @@ pub fn draw(device: &Device, outputs: &[OracleOutputs], first: u32, count: u32) 
         first_instance: 0,
         instance_count: 1,
         draw_index: 0,
+        transform_feedback: None,
     }
 }
 

@@ -8,6 +8,7 @@
 //! | [`pipeline`] | graphics pipelines, of triangles and of Gaussians, and compute pipelines |
 //! | [`pass`] | render passes, with render pass objects or dynamic rendering |
 //! | [`target`] | attachments, and [pictures](output) of their contents |
+//! | [`transform_feedback`] | the commands of transform feedback |
 //! | [`gaussians`] | Gaussians in vertex buffers, and pipelines that draw them |
 //! | [`difference`] | comparison of the pictures of two devices |
 //!
@@ -30,6 +31,7 @@ pub mod resource;
 pub mod settings;
 pub mod shader;
 pub mod target;
+pub mod transform_feedback;
 
 pub use descriptors::{Binding, Bindings, Resource, Sets};
 pub use difference::{Difference, difference, differences, for_people, write_differences};
@@ -50,3 +52,4 @@ pub use resource::{
 };
 pub use settings::{Settings, with_settings};
 pub use target::{PassObject, Target, TargetOptions, fetch_sample};
+pub use transform_feedback::TransformFeedback;

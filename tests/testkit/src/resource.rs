@@ -33,8 +33,26 @@ impl Buffer {
         buffer
     }
 
+    /// A mappable buffer of zeros for a use that an extension adds, and any other use.
+    pub fn with_usage(gpu: &Gpu, size: u64, usage: vk::BufferUsageFlags) -> Self {
+        use vk::MemoryPropertyFlags as Flags;
+        let flags = Flags::HOST_VISIBLE | Flags::HOST_COHERENT;
+        let buffer = Self::create(gpu, size, flags, usage);
+        buffer.write(&vec![0u8; buffer.size as usize]);
+        buffer
+    }
+
     /// A buffer for any use in the first memory type that has `flags`. Its contents are undefined.
     pub fn within(gpu: &Gpu, size: u64, flags: vk::MemoryPropertyFlags) -> Self {
+        Self::create(gpu, size, flags, vk::BufferUsageFlags::empty())
+    }
+
+    fn create(
+        gpu: &Gpu,
+        size: u64,
+        flags: vk::MemoryPropertyFlags,
+        further: vk::BufferUsageFlags,
+    ) -> Self {
         use vk::BufferUsageFlags as Usage;
         let size = size.max(4);
         let usage = Usage::VERTEX_BUFFER
@@ -45,7 +63,8 @@ impl Buffer {
             | Usage::UNIFORM_TEXEL_BUFFER
             | Usage::STORAGE_TEXEL_BUFFER
             | Usage::TRANSFER_SRC
-            | Usage::TRANSFER_DST;
+            | Usage::TRANSFER_DST
+            | further;
         let info = vk::BufferCreateInfo::default().size(size).usage(usage);
         let device = gpu.device();
         // SAFETY: see the crate.

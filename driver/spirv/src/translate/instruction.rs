@@ -17,7 +17,7 @@ use super::subgroup::subgroup;
 use super::translator::Translator;
 use super::value::Value;
 use super::variables::local_variable;
-use super::vertex_memory::{emit_vertex, end_primitive};
+use super::vertex_memory::{emit_stream_vertex, emit_vertex, end_primitive, end_stream_primitive};
 use crate::error::{Result, unsupported};
 use crate::instruction::Instruction;
 use crate::module::ExtendedSet;
@@ -123,8 +123,10 @@ pub fn instruction(t: &mut Translator, it: &Instruction) -> Result<()> {
         Op::DPdyFine => derivative(t, it, &[Axis::Y], true),
         Op::Fwidth | Op::FwidthCoarse => derivative(t, it, &[Axis::X, Axis::Y], false),
         Op::FwidthFine => derivative(t, it, &[Axis::X, Axis::Y], true),
-        Op::EmitVertex => emit_vertex(t),
-        Op::EndPrimitive => end_primitive(t),
+        Op::EmitVertex => emit_vertex(t, 0),
+        Op::EndPrimitive => end_primitive(t, 0),
+        Op::EmitStreamVertex => emit_stream_vertex(t, it),
+        Op::EndStreamPrimitive => end_stream_primitive(t, it),
         Op::ControlBarrier => {
             t.emit.builder.barrier();
             Ok(())

@@ -28,6 +28,7 @@ mod pointer_value;
 mod promoted;
 mod structurize;
 mod subgroup;
+mod transform_feedback;
 mod translator;
 mod value;
 mod variables;
@@ -46,7 +47,7 @@ use crate::globals::{Globals, Specialization};
 use crate::instruction::Instruction;
 use crate::interface::{
     DepthMode, Domain, InputPrimitive, Interface, OutputPrimitive, PrimitiveModes, Shader, Spacing,
-    Stage, VertexExchange,
+    Stage, TransformFeedback, VertexExchange,
 };
 use crate::module::Module;
 use analysis::Analysis;
@@ -211,6 +212,7 @@ fn execution_mode(globals: &Globals, it: &Instruction, interface: &mut Interface
         ExecutionMode::OriginLowerLeft => {
             return unsupported("an origin at the lower left");
         }
+        ExecutionMode::Xfb => interface.transform_feedback = Some(TransformFeedback::default()),
         _ => return primitive_mode(it, mode, interface.stage, &mut interface.modes),
     }
     Ok(())
@@ -256,6 +258,7 @@ fn primitive_mode(
 fn finish(mut t: Translator, declaration: &Instruction, named: &[u32]) -> Result<Shader, Error> {
     variables::declare_push_constants(&mut t);
     vertex_memory::describe(&mut t)
+        .and_then(|()| transform_feedback::describe(&mut t, named))
         .map_err(|diagnostic| diagnostic.locate(declaration.reference()))?;
     t.interface.per_sample = t.io.per_sample || variables::has_an_input_of_samples(&t, named);
     t.interface.inputs = t.io.inputs;
@@ -280,6 +283,7 @@ fn empty_interface(stage: Stage) -> Interface {
         per_sample: false,
         modes: PrimitiveModes::default(),
         exchange: VertexExchange::default(),
+        transform_feedback: None,
         has_side_effects: false,
         uses_addresses: false,
     }
@@ -346,6 +350,8 @@ pub fn is_supported(capability: Capability) -> bool {
             | C::Shader
             | C::Geometry
             | C::GeometryPointSize
+            | C::GeometryStreams
+            | C::TransformFeedback
             | C::Tessellation
             | C::TessellationPointSize
             | C::Float16

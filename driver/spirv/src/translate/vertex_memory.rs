@@ -6,15 +6,17 @@
 
 use isa::ir::{Address, Format, Rate, Reg, Space, Type as IrType};
 use isa::op::Op as Ir;
-use spirv::{BuiltIn, Decoration, StorageClass};
+use spirv::{BuiltIn, Capability, Decoration, StorageClass};
 
 use super::inputs_outputs::output_target;
 use super::translator::Translator;
 use super::value::{MemoryRef, TIGHT, scalar_bytes};
 use super::vertex_places::{Array, Emission, Region};
 use crate::error::{Result, malformed};
+use crate::instruction::Instruction;
 use crate::interface::{
-    InputSource, MemoryScalar, Output, OutputTarget, ScalarType, Stage, VertexMemory,
+    InputSource, MAX_VERTEX_STREAMS, MemoryScalar, Output, OutputTarget, ScalarType, Stage,
+    VertexMemory,
 };
 use crate::types::{Scalar, Type};
 
@@ -60,7 +62,7 @@ pub fn allocate(t: &mut Translator) -> Result<()> {
             count: count_output(t),
             begins_strip: {
                 let one = t.emit.u32(1);
-                variable(t, one)
+                (0..streams(t)).map(|_| variable(t, one)).collect()
             },
         };
         t.vertex_memory.emission = Some(emission);
@@ -250,8 +252,36 @@ fn count_output(t: &mut Translator) -> Reg {
     t.emit.builder.output(slot, IrType::B32)
 }
 
-/// Translates `OpEmitVertex`. Vertices beyond the most that the stage declares are dropped.
-pub fn emit_vertex(t: &mut Translator) -> Result<()> {
+/// The number of streams to which a geometry stage may emit vertices.
+fn streams(t: &Translator) -> usize {
+    match t.module.declares(Capability::GeometryStreams) {
+        true => MAX_VERTEX_STREAMS,
+        false => 1,
+    }
+}
+
+/// The stream that an instruction names.
+fn stream(t: &Translator, it: &Instruction) -> Result<u32> {
+    match t.globals.constant_u32(it.id(0)?) {
+        Some(stream) if (stream as usize) < streams(t) => Ok(stream),
+        _ => malformed("the stream isn't a constant that there is"),
+    }
+}
+
+/// Translates `OpEmitStreamVertex`.
+pub fn emit_stream_vertex(t: &mut Translator, it: &Instruction) -> Result<()> {
+    let stream = stream(t, it)?;
+    emit_vertex(t, stream)
+}
+
+/// Translates `OpEndStreamPrimitive`.
+pub fn end_stream_primitive(t: &mut Translator, it: &Instruction) -> Result<()> {
+    let stream = stream(t, it)?;
+    end_primitive(t, stream)
+}
+
+/// Emits a vertex to a stream. Vertices beyond the most that the stage declares are dropped.
+pub fn emit_vertex(t: &mut Translator, stream: u32) -> Result<()> {
     let Some(emission) = &t.vertex_memory.emission else {
         return malformed("this stage emits no vertices");
     };
@@ -260,11 +290,19 @@ pub fn emit_vertex(t: &mut Translator) -> Result<()> {
         vertex_bytes,
         next,
         count,
-        begins_strip,
-        ..
+        ref begins_strip,
+        ref variables,
     } = *emission;
-    let mut stored = vec![begins_strip];
-    for id in emission.variables.clone() {
+    let (begins_strip, variables) = (begins_strip[stream as usize], variables.clone());
+    let header = match stream {
+        0 => begins_strip,
+        _ => {
+            let number = t.emit.u32(stream << 1);
+            t.emit.op(Ir::Or, &[begins_strip, number])
+        }
+    };
+    let mut stored = vec![header];
+    for id in variables {
         let Some(variable) = t.promoted.find(id) else {
             return malformed(format!("output %{id} isn't held in registers"));
         };
@@ -299,12 +337,12 @@ pub fn emit_vertex(t: &mut Translator) -> Result<()> {
     Ok(())
 }
 
-/// Translates `OpEndPrimitive`.
-pub fn end_primitive(t: &mut Translator) -> Result<()> {
+/// Ends the strip of a stream.
+pub fn end_primitive(t: &mut Translator, stream: u32) -> Result<()> {
     let Some(emission) = &t.vertex_memory.emission else {
         return malformed("this stage emits no primitives");
     };
-    let begins_strip = emission.begins_strip;
+    let begins_strip = emission.begins_strip[stream as usize];
     let one = t.emit.u32(1);
     t.emit.builder.assign(begins_strip, one);
     Ok(())

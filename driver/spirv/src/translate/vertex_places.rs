@@ -39,8 +39,8 @@ pub struct Emission {
     pub next: Reg,
     /// The number of vertices that the lane emitted: an output.
     pub count: Reg,
-    /// 1 if the next vertex is the first of a strip: a variable.
-    pub begins_strip: Reg,
+    /// 1 if the next vertex of a stream is the first of a strip: a variable for each stream.
+    pub begins_strip: Vec<Reg>,
 }
 
 /// The places of vertices' values in workgroup memory.

@@ -4,12 +4,12 @@
 use std::collections::HashSet;
 use std::sync::Arc;
 
-use crate::common::{folder, translated, words_of};
+use crate::common::{OPTIONS, folder, translated, words_of};
 use fearless_simd::Level;
 use gaurast_spirv::{
     BuiltIn, DepthMode, DescriptorKind, Domain, InputPrimitive, InputSource, Interface,
     Interpolation, Module, OutputPrimitive, OutputTarget, PrimitiveModes, Sampling, ScalarType,
-    Spacing, Specialization, VertexMemory,
+    Spacing, Specialization, Stage, VertexMemory, translate,
 };
 use isa::Options as ExecOptions;
 use isa::machine::{Executable, LaneMask, Machine, Watchdog};
@@ -335,5 +335,63 @@ fn a_vertex_shader_transforms() {
                 "{output:?}"
             );
         }
+    }
+}
+
+#[gaurast_runner::test]
+fn captured_outputs_have_places_in_buffers() {
+    let captured = interface("captured.geom").transform_feedback;
+    let captured = captured.expect("something is captured");
+    assert_eq!(captured.strides, [0, 24, 16, 16]);
+    assert_eq!(captured.streams, [0, 1, 0, 0]);
+    let scalars = captured.scalars.iter();
+    let found: Vec<_> = scalars
+        .map(|it| (it.buffer, it.offset, it.target))
+        .collect();
+    // The members of a block have a location each.
+    let expected = [
+        (1, 4, location(0, 0)),
+        (1, 8, location(0, 1)),
+        (1, 12, location(1, 0)),
+        (1, 16, location(1, 1)),
+        (2, 0, location(4, 0)),
+        (2, 8, location(2, 0)),
+        (3, 0, location(7, 0)),
+        (3, 8, location(5, 0)),
+    ];
+    assert_eq!(found, expected);
+    assert_eq!(interface("strips.geom").transform_feedback, None);
+}
+
+/// The words of `captured.geom`, in which a member of its block has another offset.
+fn captured_with_offset(offset: u32) -> Vec<u32> {
+    let mut words = words_of("captured.geom");
+    // OpMemberDecorate %Block 0 Offset 8
+    let at = words
+        .windows(5)
+        .position(|it| it[0] == 5 << 16 | 72 && it[2..] == [0, 35, 8])
+        .expect("the decoration");
+    words[at + 4] = offset;
+    words
+}
+
+#[gaurast_runner::test]
+fn captured_outputs_lie_apart_and_inside_their_vertex() {
+    for (offset, reason) in [
+        (6, "byte 6 of 16"),
+        (16, "byte 16 of 16"),
+        (u32::MAX - 3, "of 16"),
+        (0, "two outputs are captured at one place"),
+    ] {
+        let module = Module::parse(&captured_with_offset(offset)).expect("a module");
+        let translated = translate(
+            &module,
+            "main",
+            Stage::Geometry,
+            &Specialization::default(),
+            &OPTIONS,
+        );
+        let error = translated.expect_err(reason).to_string();
+        assert!(error.contains(reason), "{offset}: {error}");
     }
 }

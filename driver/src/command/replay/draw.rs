@@ -215,6 +215,7 @@ pub(super) fn primitives(
         first_instance: parameters.first_instance,
         instance_count: parameters.instance_count,
         draw_index,
+        transform_feedback: state.transform_feedback.clone(),
         state: draw_state(state, primitives)?,
     })))
 }

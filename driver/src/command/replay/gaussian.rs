@@ -135,6 +135,7 @@ fn shaded(
             first_instance: parameters.first_instance,
             instance_count: parameters.instance_count,
             draw_index,
+            transform_feedback: None,
             state: Arc::new(DrawState {
                 viewports: vec![viewport],
                 ..DrawState::new(Topology::PointList, [0; 2])

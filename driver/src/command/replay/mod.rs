@@ -7,13 +7,14 @@ mod state;
 
 use self::draw::DrawError;
 use self::state::{SharedSet, State, slot};
-use super::{Command, DrawIndirect, DrawParameters, HarmonicsBuffer, query};
+use super::{Command, DrawByteCount, DrawIndirect, DrawParameters, HarmonicsBuffer, query};
 use crate::abi::error::Error;
 use crate::device_sync::{DeviceSync, WaitResult};
 use crate::instance::Instance;
 use crate::pipeline::PipelineKind;
 use ash::vk;
 use simdevice::command_processor::ExecutionError;
+use simdevice::transform_feedback::{CounterWords, TransformFeedback};
 use simdevice::{CommandProcessor, Packet};
 use std::sync::Arc;
 
@@ -167,6 +168,35 @@ fn execute(
             state.discards = is_read && (word == [0]) != *is_inverted;
         }
         Command::EndConditional => state.discards = false,
+        Command::BindTransformFeedbackBuffer { binding, buffer } => {
+            if let Some(bound) = state.captured_buffers.get_mut(*binding as usize) {
+                *bound = Some(buffer.clone());
+            }
+        }
+        Command::BeginTransformFeedback(counters) => {
+            let feedback = Arc::new(TransformFeedback::new(state.captured_buffers.clone()));
+            state.transform_feedback = Some(Arc::clone(&feedback));
+            let counters = CounterWords::clone(counters);
+            execution.execute(&Packet::BeginTransformFeedback { feedback, counters })?;
+        }
+        Command::EndTransformFeedback(counters) => {
+            if let Some(feedback) = state.transform_feedback.take() {
+                let counters = CounterWords::clone(counters);
+                execution.execute(&Packet::EndTransformFeedback { feedback, counters })?;
+            }
+        }
+        Command::DrawByteCount(drawn) => draw_byte_count(state, drawn, execution)?,
+        Command::BeginStreamQuery {
+            pool,
+            query,
+            stream,
+        } => {
+            pool.set_stream(*query, *stream);
+            execution.execute(&Packet::BeginQuery {
+                pool: Arc::clone(&pool.queries),
+                index: *query,
+            })?;
+        }
         Command::SetEvent(event, value) => event.set(*value),
         Command::WaitEvents(events) => {
             for event in events {
@@ -201,6 +231,7 @@ fn is_conditional(command: &Command) -> bool {
         Command::Draw(_)
             | Command::DrawMulti(_)
             | Command::DrawIndirect(_)
+            | Command::DrawByteCount(_)
             | Command::Dispatch { .. }
             | Command::DispatchIndirect(_)
             | Command::Packet(Packet::ClearAttachments(_))
@@ -264,6 +295,23 @@ fn packets(
                 .map(|packet| vec![packet])
         }
     }
+}
+
+/// Draws the vertices that transform feedback has written.
+fn draw_byte_count(
+    state: &mut State,
+    drawn: &DrawByteCount,
+    execution: &mut Execution<'_>,
+) -> Result<(), Error> {
+    let written = draw::read_count(&drawn.counter).unwrap_or(0);
+    let parameters = DrawParameters {
+        vertex_offset: None,
+        first: 0,
+        count: written.saturating_sub(drawn.counter_offset) / drawn.vertex_stride.max(1),
+        first_instance: drawn.first_instance,
+        instance_count: drawn.instance_count,
+    };
+    draw(state, &parameters, 0, execution)
 }
 
 fn dispatch(

@@ -12,6 +12,7 @@ use crate::pipeline::state::VertexInput;
 use simdevice::packet::GaussianBegin;
 use simdevice::state::gaussian::Camera;
 use simdevice::state::{DrawState, Rect, Viewport};
+use simdevice::transform_feedback::{CounterWords, TransformFeedback};
 use std::sync::Arc;
 
 /// Bound state. All of it is undefined, which is `None`, when a command buffer begins.
@@ -50,6 +51,10 @@ pub(crate) struct State {
     pub(crate) cameras: Box<[Camera]>,
     /// The buffer of spherical harmonics.
     pub(crate) harmonics: Option<HarmonicsBuffer>,
+    /// The buffers that transform feedback writes.
+    pub(crate) captured_buffers: CounterWords,
+    /// Transform feedback, while it is active.
+    pub(crate) transform_feedback: Option<Arc<TransformFeedback>>,
     /// True where draws, dispatches and clears of attachments are not executed.
     pub(crate) discards: bool,
     /// The sorted set that draws share, if one was begun.

@@ -19,6 +19,7 @@ fn pass_through() -> DrawPrograms {
         vertex_inputs: inputs,
         vertex_outputs: outputs,
         varyings: 4,
+        captured: None,
         tessellation: None,
         geometry: None,
         fragment: Some(fragment(

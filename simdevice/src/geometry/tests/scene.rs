@@ -121,6 +121,7 @@ pub fn programs(extra: &[VertexOutput]) -> DrawPrograms {
         vertex_inputs: inputs,
         vertex_outputs: outputs,
         varyings: 4,
+        captured: None,
         tessellation: None,
         geometry: None,
         fragment: Some(fragment(&[Flat, Flat, Perspective, Linear])),
@@ -193,6 +194,7 @@ pub fn draw_with(
         first_instance: 0,
         instance_count: 1,
         draw_index: 0,
+        transform_feedback: None,
     }
 }
 

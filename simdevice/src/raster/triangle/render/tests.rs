@@ -164,6 +164,7 @@ fn draw(
         vertex_inputs: Vec::new(),
         vertex_outputs: Vec::new(),
         varyings: per_vertex as u32,
+        captured: None,
         tessellation: None,
         geometry: None,
         fragment,

@@ -1,0 +1,161 @@
+//! The outputs that transform feedback captures, by their decorations.
+
+use spirv::{Decoration, StorageClass};
+
+use super::inputs_outputs::output_target;
+use super::translator::Translator;
+use crate::error::{Result, malformed, unsupported};
+use crate::interface::{
+    CapturedScalar, MAX_TRANSFORM_FEEDBACK_BUFFERS, MAX_VERTEX_STREAMS, TransformFeedback,
+};
+use crate::types::{Scalar, Type};
+
+/// The bytes of a scalar.
+const SCALAR_BYTES: u32 = 4;
+
+/// The decorations of a variable or a block's member that say where it is captured.
+#[derive(Clone, Copy)]
+struct Place {
+    buffer: Option<u32>,
+    stride: Option<u32>,
+    stream: Option<u32>,
+    offset: Option<u32>,
+}
+
+impl Place {
+    fn new(number: impl Fn(Decoration) -> Option<u32>) -> Self {
+        Self {
+            buffer: number(Decoration::XfbBuffer),
+            stride: number(Decoration::XfbStride),
+            stream: number(Decoration::Stream),
+            offset: number(Decoration::Offset),
+        }
+    }
+
+    /// The place with what only the surrounding variable says.
+    fn or(self, outer: Self) -> Self {
+        Self {
+            buffer: self.buffer.or(outer.buffer),
+            stride: self.stride.or(outer.stride),
+            stream: self.stream.or(outer.stream),
+            offset: self.offset.or(outer.offset),
+        }
+    }
+}
+
+/// Describes in the interface what is captured of the variables that the entry point names, if it captures anything.
+pub fn describe(t: &mut Translator, named: &[u32]) -> Result<()> {
+    let Some(mut captured) = t.interface.transform_feedback.take() else {
+        return Ok(());
+    };
+    for &id in named {
+        let variable = t.globals.variables.get(&id);
+        if let Some(variable) = variable.filter(|it| it.class == StorageClass::Output) {
+            let ty = variable.pointee;
+            capture_variable(t, id, ty, &mut captured)?;
+        }
+    }
+    captured
+        .scalars
+        .sort_by_key(|scalar| (scalar.buffer, scalar.offset));
+    check(&captured)?;
+    t.interface.transform_feedback = Some(captured);
+    Ok(())
+}
+
+fn capture_variable(
+    t: &mut Translator,
+    id: u32,
+    ty: u32,
+    captured: &mut TransformFeedback,
+) -> Result<()> {
+    let types = &t.globals.types;
+    let place = Place::new(|decoration| t.module.literal(id, decoration));
+    let (block, copies) = match types.get(ty)? {
+        Type::Array { element, count, .. } => (*element, *count),
+        _ => (ty, 1),
+    };
+    let members = match types.get(block)? {
+        Type::Struct(members) if place.offset.is_none() => members.clone(),
+        _ => {
+            let scalars = types.scalars(ty)?;
+            return capture(t, id, 0..scalars, place, captured);
+        }
+    };
+    // Each block of an array has its own buffer.
+    let mut first = 0;
+    for copy in 0..copies {
+        for (number, member) in (0..).zip(members.iter()) {
+            let own = Place::new(|it| t.module.member_literal(block, number, it));
+            let mut place = own.or(place);
+            place.buffer = place.buffer.map(|buffer| buffer.saturating_add(copy));
+            let end = first + t.globals.types.scalars(member.ty)?;
+            capture(t, id, first..end, place, captured)?;
+            first = end;
+        }
+    }
+    Ok(())
+}
+
+/// Captures scalars of a variable, which lie side by side in the buffer, if they have an offset.
+fn capture(
+    t: &mut Translator,
+    id: u32,
+    scalars: std::ops::Range<u32>,
+    place: Place,
+    captured: &mut TransformFeedback,
+) -> Result<()> {
+    let Some(buffer) = place.buffer else {
+        return Ok(());
+    };
+    let stream = place.stream.unwrap_or(0);
+    if buffer as usize >= MAX_TRANSFORM_FEEDBACK_BUFFERS || stream as usize >= MAX_VERTEX_STREAMS {
+        return unsupported(format!(
+            "%{id} is captured in buffer {buffer} from stream {stream}"
+        ));
+    }
+    captured.streams[buffer as usize] = stream;
+    if let Some(stride) = place.stride {
+        captured.strides[buffer as usize] = stride;
+    }
+    let Some(offset) = place.offset else {
+        return Ok(());
+    };
+    let types = t.globals.types.flatten(t.globals.variables[&id].pointee)?;
+    let locations = t.io.locations(id)?;
+    for (number, index) in (0..).zip(scalars) {
+        let index = index as usize;
+        if !matches!(
+            types[index],
+            Scalar::Int { width: 32, .. } | Scalar::Float { width: 32 }
+        ) {
+            return unsupported(format!("%{id} is captured, and not of 32 bits"));
+        }
+        captured.scalars.push(CapturedScalar {
+            target: output_target(locations[index])?,
+            buffer,
+            offset: offset.saturating_add(SCALAR_BYTES * number),
+        });
+    }
+    Ok(())
+}
+
+/// Refuses scalars that overlap, aren't aligned or lie outside a vertex.
+fn check(captured: &TransformFeedback) -> Result<()> {
+    for scalar in &captured.scalars {
+        let stride = captured.strides[scalar.buffer as usize];
+        let end = scalar.offset.saturating_add(SCALAR_BYTES);
+        let is_aligned = scalar.offset.is_multiple_of(SCALAR_BYTES) && stride.is_multiple_of(4);
+        if !is_aligned || end > stride {
+            return malformed(format!(
+                "an output is captured at byte {} of {stride}",
+                scalar.offset
+            ));
+        }
+    }
+    let mut pairs = captured.scalars.windows(2);
+    if pairs.any(|pair| (pair[0].buffer, pair[0].offset) == (pair[1].buffer, pair[1].offset)) {
+        return malformed("two outputs are captured at one place");
+    }
+    Ok(())
+}
