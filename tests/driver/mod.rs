@@ -21,6 +21,7 @@ mod samplers;
 mod storage;
 mod tessellation_shaders;
 mod transform_feedback;
+mod wide_values;
 mod window;
 #[cfg(target_os = "linux")]
 mod x11;

@@ -164,13 +164,18 @@ fn attributes_are_of_the_kinds_that_the_shader_reads() {
 }
 
 #[gaurast_runner::test]
-fn values_of_64_bits_do_not_pass_between_stages() {
+fn attributes_of_64_bits_are_refused() {
     let gpu = open();
     let request = Graphics {
-        shaders: vec![Shader::vertex(spirv!("doubles.vert"))],
+        shaders: vec![Shader::vertex(spirv!("double_attribute.vert"))],
         ..colored()
     };
     assert_refused(&gpu, &request, LACKING, "64 bits");
+    let outputs = Graphics {
+        shaders: vec![Shader::vertex(spirv!("doubles.vert"))],
+        ..colored()
+    };
+    assert_made(&gpu, &outputs);
 }
 
 #[gaurast_runner::test]

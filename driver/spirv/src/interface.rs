@@ -137,7 +137,7 @@ pub enum InputSource {
     Patch,
 }
 
-/// One scalar that the program reads. Its slot in the program is its index in [`Interface::inputs`].
+/// One scalar that the program reads, or a word of one of 64 bits that another stage writes. Its slot in the program is its index in [`Interface::inputs`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Input {
     /// Its source.
@@ -169,7 +169,7 @@ pub enum OutputTarget {
     VertexCount,
 }
 
-/// One scalar that the program writes. Its slot in the program is its index in [`Interface::outputs`].
+/// One scalar, or a word of one of 64 bits, that the program writes. Its slot in the program is its index in [`Interface::outputs`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Output {
     /// Its target.
@@ -258,7 +258,7 @@ pub struct VertexMemory {
     pub scalars: Vec<MemoryScalar>,
 }
 
-/// A scalar in the memory of a primitive or patch.
+/// A scalar in the memory of a primitive or patch, or a word of one of 64 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MemoryScalar {
     /// The output that it is, of this stage or of the one before.
@@ -284,6 +284,8 @@ pub struct VertexExchange {
     /// The outputs. A vertex that a geometry stage emits begins with a word: bit 0 is 1 if the vertex is the first of a
     /// strip, and the bits above are the number of its stream.
     pub outputs: VertexMemory,
+    /// Geometry: the bytes of an emitted vertex.
+    pub vertex_bytes: u32,
 }
 
 /// The most buffers that transform feedback writes.
@@ -299,11 +301,11 @@ pub struct TransformFeedback {
     pub strides: [u32; MAX_TRANSFORM_FEEDBACK_BUFFERS],
     /// The stream of the vertices in each buffer.
     pub streams: [u32; MAX_TRANSFORM_FEEDBACK_BUFFERS],
-    /// The scalars, each of 32 bits, by buffer and offset. They don't overlap.
+    /// The scalars by buffer and offset. They don't overlap.
     pub scalars: Vec<CapturedScalar>,
 }
 
-/// A scalar that transform feedback captures.
+/// A scalar that transform feedback captures, or a word of one of 64 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CapturedScalar {
     /// The output.

@@ -38,16 +38,6 @@ pub(crate) struct StageShaders {
 }
 
 impl StageShaders {
-    /// All shaders, in the order of their stages.
-    fn all(&self) -> impl Iterator<Item = &Shader> {
-        let tessellation = self.tessellation.iter();
-        let tessellation = tessellation.flat_map(|it| [&it.control, &it.evaluation]);
-        let after = self.geometry.iter().chain(&self.fragment);
-        std::iter::once(&self.vertex)
-            .chain(tessellation)
-            .chain(after)
-    }
-
     /// The last shader before rasterization.
     pub(crate) fn last(&self) -> &Shader {
         let evaluation = self.tessellation.as_ref().map(|it| &it.evaluation);
@@ -65,9 +55,7 @@ pub(crate) fn link(
     stream: impl Fn(u32) -> Option<usize>,
     live_outputs: LiveOutputs<'_>,
 ) -> Result<DrawPrograms, Error> {
-    for shader in shaders.all() {
-        check_widths(&shader.interface)?;
-    }
+    check_attributes(&shaders.vertex.interface)?;
     let evaluation = shaders.tessellation.as_mut().map(|it| &mut it.evaluation);
     let last = shaders.geometry.as_mut().or(evaluation);
     let last = last.unwrap_or(&mut shaders.vertex);
@@ -121,7 +109,7 @@ pub(crate) fn link_projection(
     stream: impl Fn(u32) -> Option<usize>,
     components: &[InterfaceComponent],
 ) -> Result<DrawPrograms, Error> {
-    check_widths(&vertex.interface)?;
+    check_attributes(&vertex.interface)?;
     let varyings: Varyings = components.iter().copied().zip(0..).collect();
     Ok(DrawPrograms {
         varyings: components.len() as u32,
@@ -133,16 +121,12 @@ pub(crate) fn link_projection(
 
 /// Links a fragment program that computes colours from the accumulated values of Gaussians. `varyings` gives their
 /// numbers.
-///
-/// # Errors
-/// As [`link`].
 pub(crate) fn link_resolve(
     fragment: Shader,
     varyings: &Varyings,
     live_outputs: LiveOutputs<'_>,
-) -> Result<FragmentPrograms, Error> {
-    check_widths(&fragment.interface)?;
-    Ok(fragment_programs(fragment, varyings, live_outputs))
+) -> FragmentPrograms {
+    fragment_programs(fragment, varyings, live_outputs)
 }
 
 /// The vertex program alone.
@@ -215,30 +199,20 @@ fn fragment_programs(
     }
 }
 
-/// Refuses values of 64 bits at a stage's inputs and outputs.
-fn check_widths(interface: &Interface) -> Result<(), Error> {
-    let is_wide = |numeric: ScalarType| {
+/// Refuses attributes of 64 bits.
+fn check_attributes(vertex: &Interface) -> Result<(), Error> {
+    let is_wide = |input: &Input| {
         matches!(
-            numeric,
+            input.numeric,
             ScalarType::Float { width: 64 }
                 | ScalarType::Int { width: 64 }
                 | ScalarType::Uint { width: 64 }
         )
     };
-    let inputs = interface.inputs.iter().map(|input| input.numeric);
-    let outputs = interface.outputs.iter().map(|output| output.numeric);
-    let exchange = &interface.exchange;
-    let scalars = exchange
-        .inputs
-        .scalars
-        .iter()
-        .chain(&exchange.outputs.scalars);
-    let exchanged = scalars.map(|scalar| scalar.numeric);
-    if inputs.chain(outputs).chain(exchanged).any(is_wide) {
-        return Err(Error::FeatureNotPresent(format!(
-            "an input or output of 64 bits in the {} shader",
-            interface.stage
-        )));
+    if vertex.inputs.iter().any(is_wide) {
+        return Err(Error::FeatureNotPresent(
+            "an input of 64 bits in the vertex shader".into(),
+        ));
     }
     Ok(())
 }

@@ -133,19 +133,13 @@ pub(super) fn geometry(
             outputs.push(meaning);
         }
     }
-    // Even a vertex without values counts.
-    if gives.values.is_empty()
-        && let Some(scalar) = memory.scalars.first()
-    {
-        gives.values.push(value(0, scalar));
-        outputs.push(None);
-    }
     let mut count = shader.interface.outputs.iter();
     let count = count.position(|output| output.target == OutputTarget::VertexCount);
     GeometryPrograms {
         invocations: modes.invocations.unwrap_or(1).max(1),
         count: count.unwrap_or(0) as u32,
         gives,
+        vertex_bytes: shader.interface.exchange.vertex_bytes,
         outputs,
         corners: match modes.output {
             Some(OutputPrimitive::Points) => 1,

@@ -107,7 +107,7 @@ impl<'a> GeometryShader<'a> {
     fn take(&mut self, primitives: &PrimitiveList, first: usize, lanes: usize) {
         self.columns.iter_mut().for_each(Vec::clear);
         let gives = &self.stage.gives;
-        let vertex_bytes = gives.values.first().and_then(|value| value.vertex_stride);
+        let vertex_bytes = self.stage.vertex_bytes;
         let mut vertices = 0;
         let slot_before = self.shaded.vertices.len() as u32;
         for lane in 0..lanes {
@@ -115,8 +115,7 @@ impl<'a> GeometryShader<'a> {
             let id = primitives.ids[(first + lane) / self.stage.invocations];
             self.strips.iter_mut().for_each(Vec::clear);
             for number in 0..count {
-                let start =
-                    gives.start + lane as u32 * gives.stride + number * vertex_bytes.unwrap_or(0);
+                let start = gives.start + lane as u32 * gives.stride + number * vertex_bytes;
                 let slot = slot_before + vertices;
                 let header = self.runner.given(start);
                 let (begins, stream) = (header & 1 != 0, header >> 1);

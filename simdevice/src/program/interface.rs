@@ -171,6 +171,8 @@ pub struct GeometryPrograms {
     /// The vertices that it gives. Each begins with a word: bit 0 is 1 if the vertex is the first of a strip, and the
     /// bits above are the number of its stream.
     pub gives: VertexMemory,
+    /// The bytes of a vertex that it gives.
+    pub vertex_bytes: u32,
     /// The meanings of the values that it gives; `None` is not used.
     pub outputs: Vec<Option<VertexOutput>>,
     /// The number of corners of the primitives that it gives: 1 to 3.

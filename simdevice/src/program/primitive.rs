@@ -52,6 +52,8 @@ pub(crate) struct GeometryStage {
     pub count: u32,
     /// The vertices that it gives.
     pub gives: VertexMemory,
+    /// The bytes of each.
+    pub vertex_bytes: u32,
     /// The outputs, by number in `gives`.
     pub outputs: VertexOutputs,
     /// The number of corners of the primitives that it gives.
@@ -112,6 +114,7 @@ impl GeometryStage {
             invocations: programs.invocations as usize,
             count: programs.count,
             gives: programs.gives.clone(),
+            vertex_bytes: programs.vertex_bytes,
             outputs,
             corners: programs.corners,
         })

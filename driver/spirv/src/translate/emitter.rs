@@ -40,6 +40,11 @@ impl Emitter {
         }
     }
 
+    /// The words of a 64-bit register, the lower one first.
+    pub fn words(&mut self, reg: Reg) -> [Reg; 2] {
+        [Ir::Low32, Ir::High32].map(|half| self.op(half, &[reg]))
+    }
+
     /// Counts instructions before they are emitted.
     pub fn charge_budget(&mut self, count: usize) -> Result<()> {
         self.statements += count as u64;

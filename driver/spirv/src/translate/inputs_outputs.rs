@@ -39,6 +39,39 @@ pub enum IoLocation {
     },
 }
 
+impl IoLocation {
+    /// The location of the second word of a 64-bit scalar whose first word is here.
+    fn second(self) -> Self {
+        match self {
+            Self::Location {
+                location,
+                component,
+                interpolation,
+                sampling,
+                index,
+            } => Self::Location {
+                location,
+                component: component + 1,
+                interpolation,
+                sampling,
+                index,
+            },
+            built_in => built_in,
+        }
+    }
+
+    /// The locations of a scalar's words, each with its type.
+    pub fn words(self, scalar: Scalar) -> Vec<(Self, ScalarType)> {
+        match scalar.is_wide() {
+            false => vec![(self, scalar.at_interface())],
+            true => vec![(self, WORD), (self.second(), WORD)],
+        }
+    }
+}
+
+/// The type of a word of a 64-bit scalar.
+const WORD: ScalarType = ScalarType::Uint { width: 32 };
+
 /// The location of the next scalar.
 #[derive(Clone, Copy)]
 struct Cursor {
@@ -302,28 +335,25 @@ impl<'a> InputsOutputs<'a> {
         scalar: Scalar,
     ) -> Result<Reg> {
         let locations = self.locations(variable)?;
-        match locations.get(index) {
-            Some(IoLocation::Location {
-                location,
-                component,
-                interpolation,
-                sampling,
-                ..
-            }) => {
-                self.per_sample |= *sampling == Sampling::Sample;
-                let source = InputSource::Location {
-                    location: *location,
-                    component: *component,
-                    interpolation: *interpolation,
-                    sampling: *sampling,
-                };
-                Ok(self.input(emit, source, scalar.at_interface(), Rate::Varying))
+        match locations.get(index).copied() {
+            // The device reads attributes of 64 bits whole.
+            Some(place @ IoLocation::Location { .. })
+                if scalar.is_wide() && self.stage != Stage::Vertex =>
+            {
+                let words = place.words(scalar).into_iter();
+                let words: Vec<_> = words
+                    .map(|(word, numeric)| self.word(emit, word, numeric))
+                    .collect();
+                Ok(emit.op(Ir::Join64, &words))
+            }
+            Some(place @ IoLocation::Location { .. }) => {
+                Ok(self.word(emit, place, scalar.at_interface()))
             }
             Some(IoLocation::BuiltIn {
                 built_in,
                 component,
             }) => {
-                let reg = self.built_in(emit, *built_in, *component, scalar)?;
+                let reg = self.built_in(emit, built_in, component, scalar)?;
                 if emit.builder.type_of(reg) != scalar.register() {
                     return malformed(format!("built-in {built_in:?} is of another type"));
                 }
@@ -331,6 +361,28 @@ impl<'a> InputsOutputs<'a> {
             }
             None => malformed("an access beyond the end of an input"),
         }
+    }
+
+    /// The register of an input at a location.
+    fn word(&mut self, emit: &mut Emitter, place: IoLocation, numeric: ScalarType) -> Reg {
+        let IoLocation::Location {
+            location,
+            component,
+            interpolation,
+            sampling,
+            ..
+        } = place
+        else {
+            return emit.constant(Type::B32, 0);
+        };
+        self.per_sample |= sampling == Sampling::Sample;
+        let source = InputSource::Location {
+            location,
+            component,
+            interpolation,
+            sampling,
+        };
+        self.input(emit, source, numeric, Rate::Varying)
     }
 
     fn built_in(
@@ -490,17 +542,20 @@ impl<'a> InputsOutputs<'a> {
         scalar: Scalar,
         reg: Reg,
     ) -> Result<()> {
-        let target = output_target(location)?;
-        if self.outputs.iter().any(|it| it.target == target) {
-            return malformed(format!("two outputs at {target:?}"));
+        let regs = match scalar.is_wide() {
+            false => vec![reg],
+            true => emit.words(reg).to_vec(),
+        };
+        for ((word, numeric), reg) in location.words(scalar).into_iter().zip(regs) {
+            let target = output_target(word)?;
+            if self.outputs.iter().any(|it| it.target == target) {
+                return malformed(format!("two outputs at {target:?}"));
+            }
+            let slot = self.outputs.len() as u32;
+            let output = emit.builder.output(slot, Type::B32);
+            self.outputs.push(Output { target, numeric });
+            emit.builder.assign(output, reg);
         }
-        let slot = self.outputs.len() as u32;
-        let output = emit.builder.output(slot, scalar.register());
-        self.outputs.push(Output {
-            target,
-            numeric: scalar.at_interface(),
-        });
-        emit.builder.assign(output, reg);
         Ok(())
     }
 }

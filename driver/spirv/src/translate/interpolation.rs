@@ -200,6 +200,9 @@ fn read_input(
         else {
             return unsupported("interpolation of a built-in");
         };
+        if scalar.is_wide() {
+            return malformed("a scalar of 64 bits is not interpolated");
+        }
         let source = InputSource::Location {
             location: *location,
             component: *component,

@@ -10,8 +10,8 @@ use crate::interface::{
 };
 use crate::types::{Scalar, Type};
 
-/// The bytes of a scalar.
-const SCALAR_BYTES: u32 = 4;
+/// The bytes of a word.
+const WORD_BYTES: u32 = 4;
 
 /// The decorations of a variable or a block's member that say where it is captured.
 #[derive(Clone, Copy)]
@@ -123,19 +123,23 @@ fn capture(
     };
     let types = t.globals.types.flatten(t.globals.variables[&id].pointee)?;
     let locations = t.io.locations(id)?;
-    for (number, index) in (0..).zip(scalars) {
-        let index = index as usize;
+    let mut offset = offset;
+    for index in scalars {
+        let (scalar, location) = (types[index as usize], locations[index as usize]);
         if !matches!(
-            types[index],
-            Scalar::Int { width: 32, .. } | Scalar::Float { width: 32 }
+            scalar,
+            Scalar::Int { width: 32 | 64, .. } | Scalar::Float { width: 32 | 64 }
         ) {
-            return unsupported(format!("%{id} is captured, and not of 32 bits"));
+            return unsupported(format!("%{id} is captured, and not of 32 or 64 bits"));
         }
-        captured.scalars.push(CapturedScalar {
-            target: output_target(locations[index])?,
-            buffer,
-            offset: offset.saturating_add(SCALAR_BYTES * number),
-        });
+        for (word, _) in location.words(scalar) {
+            captured.scalars.push(CapturedScalar {
+                target: output_target(word)?,
+                buffer,
+                offset,
+            });
+            offset = offset.saturating_add(WORD_BYTES);
+        }
     }
     Ok(())
 }
@@ -144,8 +148,9 @@ fn capture(
 fn check(captured: &TransformFeedback) -> Result<()> {
     for scalar in &captured.scalars {
         let stride = captured.strides[scalar.buffer as usize];
-        let end = scalar.offset.saturating_add(SCALAR_BYTES);
-        let is_aligned = scalar.offset.is_multiple_of(SCALAR_BYTES) && stride.is_multiple_of(4);
+        let end = scalar.offset.saturating_add(WORD_BYTES);
+        let is_aligned =
+            scalar.offset.is_multiple_of(WORD_BYTES) && stride.is_multiple_of(WORD_BYTES);
         if !is_aligned || end > stride {
             return malformed(format!(
                 "an output is captured at byte {} of {stride}",

@@ -201,9 +201,11 @@ fn compute_inputs(t: &mut Translator, id: u32) -> Result<()> {
         return Ok(());
     };
     for (index, location) in t.io.locations(id)?.iter().enumerate() {
-        if let IoLocation::BuiltIn { built_in, .. } = location
-            && is_computed(*built_in)
-        {
+        let is_computed = match location {
+            IoLocation::BuiltIn { built_in, .. } => is_computed(*built_in),
+            IoLocation::Location { .. } => t.promoted.variables[variable].scalars[index].is_wide(),
+        };
+        if is_computed {
             let (emit, io) = (&mut t.emit, &mut t.io);
             t.promoted.read_scalar(emit, io, variable, index)?;
         }

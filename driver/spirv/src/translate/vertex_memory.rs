@@ -10,7 +10,7 @@ use spirv::{BuiltIn, Capability, Decoration, StorageClass};
 
 use super::inputs_outputs::output_target;
 use super::translator::Translator;
-use super::value::{MemoryRef, TIGHT, scalar_bytes};
+use super::value::{MemoryRef, TIGHT};
 use super::vertex_places::{Array, Emission, Region};
 use crate::error::{Result, malformed};
 use crate::instruction::Instruction;
@@ -32,8 +32,10 @@ const MAX_ELEMENTS: usize = 16;
 const MAX_PATCH_VERTICES: u32 = 32;
 /// The most vertices that an invocation of a geometry stage emits.
 const MAX_EMITTED_VERTICES: u32 = 256;
+/// The bytes of a word.
+const WORD_BYTES: u32 = 4;
 /// The bytes of an emitted vertex before its scalars.
-const VERTEX_HEADER: u32 = 4;
+const VERTEX_HEADER: u32 = WORD_BYTES;
 
 /// Reserves the memory of a tessellation or geometry stage.
 pub fn allocate(t: &mut Translator) -> Result<()> {
@@ -309,10 +311,11 @@ pub fn emit_vertex(t: &mut Translator, stream: u32) -> Result<()> {
         for index in 0..t.promoted.variables[variable].scalars.len() {
             let (emit, io) = (&mut t.emit, &mut t.io);
             let reg = t.promoted.read_scalar(emit, io, variable, index)?;
-            if t.emit.builder.type_of(reg) != IrType::B32 {
-                return malformed("an output of a geometry shader isn't of 32 bits");
+            match t.emit.builder.type_of(reg) {
+                IrType::B32 => stored.push(reg),
+                IrType::B64 => stored.extend(t.emit.words(reg)),
+                _ => return malformed("an output of a geometry shader is a truth value"),
             }
-            stored.push(reg);
         }
     }
     t.emit.charge_budget(stored.len())?;
@@ -354,6 +357,7 @@ pub fn describe(t: &mut Translator) -> Result<()> {
     t.interface.exchange.inputs = arrays(t, &places.inputs)?;
     t.interface.exchange.outputs = arrays(t, &places.outputs)?;
     if let Some(emission) = &places.emission {
+        t.interface.exchange.vertex_bytes = emission.vertex_bytes;
         let scalars = emitted_scalars(t, emission)?;
         t.interface.exchange.outputs.scalars = scalars;
     }
@@ -367,13 +371,15 @@ fn arrays(t: &mut Translator, region: &Region) -> Result<VertexMemory> {
         let locations = t.io.locations_as(array.variable, array.ty)?;
         let mut offset = array.offset;
         for (location, scalar) in locations.iter().zip(types) {
-            scalars.push(MemoryScalar {
-                target: output_target(*location)?,
-                numeric: scalar.at_interface(),
-                offset,
-                vertex_stride: array.vertex_stride,
-            });
-            offset = offset.saturating_add(scalar_bytes(scalar, TIGHT));
+            for (word, numeric) in location.words(scalar) {
+                scalars.push(MemoryScalar {
+                    target: output_target(word)?,
+                    numeric,
+                    offset,
+                    vertex_stride: array.vertex_stride,
+                });
+                offset = offset.saturating_add(WORD_BYTES);
+            }
         }
     }
     Ok(VertexMemory {
@@ -394,15 +400,17 @@ fn emitted_scalars(t: &mut Translator, emission: &Emission) -> Result<Vec<Memory
         let locations = t.io.locations(*id)?;
         let variable = &t.promoted.variables[number];
         for (index, location) in locations.iter().enumerate() {
-            if variable.written[index] {
-                scalars.push(MemoryScalar {
-                    target: output_target(*location)?,
-                    numeric: variable.scalars[index].at_interface(),
-                    offset,
-                    vertex_stride: Some(emission.vertex_bytes),
-                });
+            for (word, numeric) in location.words(variable.scalars[index]) {
+                if variable.written[index] {
+                    scalars.push(MemoryScalar {
+                        target: output_target(word)?,
+                        numeric,
+                        offset,
+                        vertex_stride: Some(emission.vertex_bytes),
+                    });
+                }
+                offset = offset.saturating_add(WORD_BYTES);
             }
-            offset = offset.saturating_add(VERTEX_HEADER);
         }
     }
     Ok(scalars)

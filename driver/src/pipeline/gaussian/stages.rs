@@ -110,7 +110,7 @@ impl ResolveStage {
             points: false,
             views: info.fragment_output.view_mask != 0,
         };
-        let programs = link::link_resolve(fragment, &varyings, live_outputs)?;
+        let programs = link::link_resolve(fragment, &varyings, live_outputs);
         let program = GaussianFragmentProgram::new(device.simulated().level(), &programs)
             .map_err(|error| Error::InvalidShader(error.to_string()))?;
         Ok(Some(Self {
