@@ -13,6 +13,9 @@ use crate::types::{Scalar, Type};
 /// The bytes of a word.
 const WORD_BYTES: u32 = 4;
 
+/// An offset that no vertex has.
+const MAX_OFFSET: u32 = 1 << 31;
+
 /// The decorations of a variable or a block's member that say where it is captured.
 #[derive(Clone, Copy)]
 struct Place {
@@ -97,7 +100,8 @@ fn capture_variable(
     Ok(())
 }
 
-/// Captures scalars of a variable, which lie side by side in the buffer, if they have an offset.
+/// Captures scalars of a variable, if they have an offset. They lie side by side in the buffer, those of 64 bits at
+/// multiples of 8.
 fn capture(
     t: &mut Translator,
     id: u32,
@@ -123,7 +127,7 @@ fn capture(
     };
     let types = t.globals.types.flatten(t.globals.variables[&id].pointee)?;
     let locations = t.io.locations(id)?;
-    let mut offset = offset;
+    let mut offset = offset.min(MAX_OFFSET);
     for index in scalars {
         let (scalar, location) = (types[index as usize], locations[index as usize]);
         if !matches!(
@@ -131,6 +135,9 @@ fn capture(
             Scalar::Int { width: 32 | 64, .. } | Scalar::Float { width: 32 | 64 }
         ) {
             return unsupported(format!("%{id} is captured, and not of 32 or 64 bits"));
+        }
+        if scalar.is_wide() {
+            offset = offset.next_multiple_of(2 * WORD_BYTES);
         }
         for (word, _) in location.words(scalar) {
             captured.scalars.push(CapturedScalar {
