@@ -8,7 +8,7 @@ use crate::error::{Result, malformed, unsupported};
 use crate::interface::{
     CapturedScalar, MAX_TRANSFORM_FEEDBACK_BUFFERS, MAX_VERTEX_STREAMS, TransformFeedback,
 };
-use crate::types::{Scalar, Type};
+use crate::types::{Scalar, Type, Types};
 
 /// The bytes of a word.
 const WORD_BYTES: u32 = 4;
@@ -80,10 +80,7 @@ fn capture_variable(
     };
     let members = match types.get(block)? {
         Type::Struct(members) if place.offset.is_none() => members.clone(),
-        _ => {
-            let scalars = types.scalars(ty)?;
-            return capture(t, id, 0..scalars, place, captured);
-        }
+        _ => return capture(t, id, 0, ty, place, captured),
     };
     // Each block of an array has its own buffer.
     let mut first = 0;
@@ -92,20 +89,51 @@ fn capture_variable(
             let own = Place::new(|it| t.module.member_literal(block, number, it));
             let mut place = own.or(place);
             place.buffer = place.buffer.map(|buffer| buffer.saturating_add(copy));
-            let end = first + t.globals.types.scalars(member.ty)?;
-            capture(t, id, first..end, place, captured)?;
-            first = end;
+            capture(t, id, first, member.ty, place, captured)?;
+            first += t.globals.types.scalars(member.ty)?;
         }
     }
     Ok(())
 }
 
-/// Captures scalars of a variable, if they have an offset. They lie side by side in the buffer, those of 64 bits at
-/// multiples of 8.
+/// The offset of each scalar of a type from `offset` on, which becomes the end. Scalars lie side by side, but those of
+/// 64 bits, and structures with such scalars, begin at multiples of 8.
+fn place_scalars(types: &Types, ty: u32, offset: &mut u32, into: &mut Vec<u32>) -> Result<()> {
+    let alignment = match types.flatten(ty)?.iter().any(|scalar| scalar.is_wide()) {
+        true => 2 * WORD_BYTES,
+        false => 1,
+    };
+    *offset = offset.next_multiple_of(alignment);
+    match types.get(ty)? {
+        Type::Struct(members) => {
+            for member in members.iter() {
+                place_scalars(types, member.ty, offset, into)?;
+            }
+        }
+        Type::Vector { element, count }
+        | Type::Matrix {
+            column: element,
+            count,
+        }
+        | Type::Array { element, count, .. } => {
+            for _ in 0..*count {
+                place_scalars(types, *element, offset, into)?;
+            }
+        }
+        _ => {
+            into.push(*offset);
+            *offset = offset.saturating_add(alignment.max(WORD_BYTES));
+        }
+    }
+    Ok(())
+}
+
+/// Captures the scalars of a part of a variable from number `first` on, if it has an offset. The part is of type `ty`.
 fn capture(
     t: &mut Translator,
     id: u32,
-    scalars: std::ops::Range<u32>,
+    first: u32,
+    ty: u32,
     place: Place,
     captured: &mut TransformFeedback,
 ) -> Result<()> {
@@ -125,27 +153,25 @@ fn capture(
     let Some(offset) = place.offset else {
         return Ok(());
     };
-    let types = t.globals.types.flatten(t.globals.variables[&id].pointee)?;
+    let types = &t.globals.types;
+    let (mut offset, mut offsets) = (offset.min(MAX_OFFSET), Vec::new());
+    place_scalars(types, ty, &mut offset, &mut offsets)?;
+    let scalars = types.flatten(ty)?;
     let locations = t.io.locations(id)?;
-    let mut offset = offset.min(MAX_OFFSET);
-    for index in scalars {
-        let (scalar, location) = (types[index as usize], locations[index as usize]);
+    let parts = scalars.into_iter().zip(offsets);
+    for ((scalar, offset), location) in parts.zip(&locations[first as usize..]) {
         if !matches!(
             scalar,
             Scalar::Int { width: 32 | 64, .. } | Scalar::Float { width: 32 | 64 }
         ) {
             return unsupported(format!("%{id} is captured, and not of 32 or 64 bits"));
         }
-        if scalar.is_wide() {
-            offset = offset.next_multiple_of(2 * WORD_BYTES);
-        }
-        for (word, _) in location.words(scalar) {
+        for (number, (word, _)) in (0..).zip(location.words(scalar)) {
             captured.scalars.push(CapturedScalar {
                 target: output_target(word)?,
                 buffer,
-                offset,
+                offset: offset + number * WORD_BYTES,
             });
-            offset = offset.saturating_add(WORD_BYTES);
         }
     }
     Ok(())

@@ -342,17 +342,19 @@ fn a_vertex_shader_transforms() {
 fn captured_outputs_have_places_in_buffers() {
     let captured = interface("captured.geom").transform_feedback;
     let captured = captured.expect("something is captured");
-    assert_eq!(captured.strides, [24, 20, 16, 16]);
+    assert_eq!(captured.strides, [32, 20, 16, 16]);
     assert_eq!(captured.streams, [2, 1, 0, 0]);
     let scalars = captured.scalars.iter();
     let found: Vec<_> = scalars
         .map(|it| (it.buffer, it.offset, it.target))
         .collect();
-    // The members of a block have a location each; a number of 64 bits is two words, at a multiple of 8.
+    // The members of a block have a location each. A number of 64 bits is two words, at a multiple of 8, as is the
+    // structure that it is in.
     let expected = [
         (0, 8, location(8, 0)),
         (0, 16, location(9, 0)),
-        (0, 20, location(9, 1)),
+        (0, 24, location(10, 0)),
+        (0, 28, location(10, 1)),
         (1, 4, location(0, 0)),
         (1, 8, location(0, 1)),
         (1, 12, location(1, 0)),

@@ -6,6 +6,10 @@ struct Wide {
     int word;
     double number;
 };
+struct Nested {
+    int before;
+    Wide wide;
+};
 layout(stream = 1) out;
 layout(location = 0, stream = 1, xfb_buffer = 1, xfb_stride = 20, xfb_offset = 4) out vec2 pair[2];
 layout(location = 2, stream = 0, xfb_buffer = 2, xfb_stride = 16) out Block {
@@ -13,7 +17,7 @@ layout(location = 2, stream = 0, xfb_buffer = 2, xfb_stride = 16) out Block {
     float uncaptured;
     layout(xfb_offset = 0) int first;
 } blocks[2];
-layout(location = 8, stream = 2, xfb_buffer = 0, xfb_stride = 24, xfb_offset = 8) out Wide wide;
+layout(location = 8, stream = 2, xfb_buffer = 0, xfb_stride = 32, xfb_offset = 8) out Nested nested;
 void main() {
     pair[0] = vec2(1.0);
     pair[1] = vec2(2.0);
@@ -22,8 +26,9 @@ void main() {
     blocks[0].second = 3.0;
     blocks[1].first = 4;
     blocks[1].uncaptured = 5.0;
-    wide.word = 6;
-    wide.number = 7.0lf;
+    nested.before = 5;
+    nested.wide.word = 6;
+    nested.wide.number = 7.0lf;
     EmitStreamVertex(0);
     EndStreamPrimitive(0);
 }
