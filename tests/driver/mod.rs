@@ -7,6 +7,7 @@ mod conditional;
 mod depth_clip;
 mod descriptors;
 mod dynamic;
+mod feedback_loop;
 mod geometry_shaders;
 mod limits;
 mod loader_door;

@@ -213,6 +213,10 @@ const USAGES: &[(vk::ImageUsageFlags, vk::FormatFeatureFlags)] = &[
         vk::ImageUsageFlags::INPUT_ATTACHMENT,
         vk::FormatFeatureFlags::SAMPLED_IMAGE,
     ),
+    (
+        vk::ImageUsageFlags::ATTACHMENT_FEEDBACK_LOOP_EXT,
+        vk::FormatFeatureFlags::SAMPLED_IMAGE,
+    ),
     // A transient attachment's contents stay in the tile buffers; the flag is used with an attachment usage.
     (
         vk::ImageUsageFlags::TRANSIENT_ATTACHMENT,
@@ -220,14 +224,20 @@ const USAGES: &[(vk::ImageUsageFlags, vk::FormatFeatureFlags)] = &[
     ),
 ];
 
-/// The features of which an input attachment's format must have one: shaders read only what can be rendered to.
+/// The usages by which shaders read attachments.
+const READ_ATTACHMENT: vk::ImageUsageFlags = vk::ImageUsageFlags::from_raw(
+    vk::ImageUsageFlags::INPUT_ATTACHMENT.as_raw()
+        | vk::ImageUsageFlags::ATTACHMENT_FEEDBACK_LOOP_EXT.as_raw(),
+);
+
+/// The features of which the format of such an attachment must have one: shaders read only what can be rendered to.
 const ATTACHMENT: vk::FormatFeatureFlags = vk::FormatFeatureFlags::from_raw(
     vk::FormatFeatureFlags::COLOR_ATTACHMENT.as_raw()
         | vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT.as_raw(),
 );
 
 fn supports_usage(features: vk::FormatFeatureFlags, usage: vk::ImageUsageFlags) -> bool {
-    if usage.contains(vk::ImageUsageFlags::INPUT_ATTACHMENT) && !features.intersects(ATTACHMENT) {
+    if usage.intersects(READ_ATTACHMENT) && !features.intersects(ATTACHMENT) {
         return false;
     }
     let supported = USAGES

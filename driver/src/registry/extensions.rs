@@ -30,6 +30,7 @@ pub(crate) const DEVICE: &[Extension] = &[
     (c"VK_GAURAST_gaussian_primitive_topology", 2),
     (c"VK_AMD_shader_early_and_late_fragment_tests", 1),
     (c"VK_EXT_4444_formats", 1),
+    (c"VK_EXT_attachment_feedback_loop_layout", 2),
     (c"VK_EXT_border_color_swizzle", 1),
     (c"VK_EXT_calibrated_timestamps", 2),
     (c"VK_EXT_color_write_enable", 1),

@@ -274,6 +274,8 @@ pub(crate) struct Features {
     pub(crate) format_a4r4g4b4: bool,
     /// `formatA4B4G4R4`.
     pub(crate) format_a4b4g4r4: bool,
+    /// `attachmentFeedbackLoopLayout`.
+    pub(crate) attachment_feedback_loop_layout: bool,
     /// `borderColorSwizzle`.
     pub(crate) border_color_swizzle: bool,
     /// `borderColorSwizzleFromImage`.
@@ -649,6 +651,7 @@ pub(crate) const SUPPORTED: Features = Features {
     shader_early_and_late_fragment_tests: true,
     format_a4r4g4b4: true,
     format_a4b4g4r4: true,
+    attachment_feedback_loop_layout: true,
     border_color_swizzle: true,
     border_color_swizzle_from_image: true,
     color_write_enable: true,
@@ -881,6 +884,7 @@ impl Features {
         shader_early_and_late_fragment_tests: false,
         format_a4r4g4b4: false,
         format_a4b4g4r4: false,
+        attachment_feedback_loop_layout: false,
         border_color_swizzle: false,
         border_color_swizzle_from_image: false,
         color_write_enable: false,
@@ -1014,7 +1018,7 @@ impl Features {
     };
 
     /// The features by their names.
-    pub(crate) fn list(&self) -> [(&'static str, bool); 262] {
+    pub(crate) fn list(&self) -> [(&'static str, bool); 263] {
         [
             ("robustBufferAccess", self.robust_buffer_access),
             ("fullDrawIndexUint32", self.full_draw_index_uint32),
@@ -1307,6 +1311,10 @@ impl Features {
             ),
             ("formatA4R4G4B4", self.format_a4r4g4b4),
             ("formatA4B4G4R4", self.format_a4b4g4r4),
+            (
+                "attachmentFeedbackLoopLayout",
+                self.attachment_feedback_loop_layout,
+            ),
             ("borderColorSwizzle", self.border_color_swizzle),
             (
                 "borderColorSwizzleFromImage",
@@ -2123,6 +2131,11 @@ impl Features {
             out.format_a4r4g4b4 = self.format_a4r4g4b4.into();
             out.format_a4b4g4r4 = self.format_a4b4g4r4.into();
         }
+        if let Some(out) =
+            structure.cast::<vk::PhysicalDeviceAttachmentFeedbackLoopLayoutFeaturesEXT<'_>>()
+        {
+            out.attachment_feedback_loop_layout = self.attachment_feedback_loop_layout.into();
+        }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceBorderColorSwizzleFeaturesEXT<'_>>() {
             out.border_color_swizzle = self.border_color_swizzle.into();
             out.border_color_swizzle_from_image = self.border_color_swizzle_from_image.into();
@@ -2754,6 +2767,12 @@ impl Features {
             self.format_a4b4g4r4 |= requested.format_a4b4g4r4 != vk::FALSE;
         }
         if let Some(requested) =
+            valid::cast::<vk::PhysicalDeviceAttachmentFeedbackLoopLayoutFeaturesEXT<'_>>(structure)
+        {
+            self.attachment_feedback_loop_layout |=
+                requested.attachment_feedback_loop_layout != vk::FALSE;
+        }
+        if let Some(requested) =
             valid::cast::<vk::PhysicalDeviceBorderColorSwizzleFeaturesEXT<'_>>(structure)
         {
             self.border_color_swizzle |= requested.border_color_swizzle != vk::FALSE;
@@ -3083,6 +3102,9 @@ pub(crate) fn extension_of(structure: vk::StructureType) -> Option<&'static CStr
             Some(c"VK_AMD_shader_early_and_late_fragment_tests")
         }
         vk::PhysicalDevice4444FormatsFeaturesEXT::STRUCTURE_TYPE => Some(c"VK_EXT_4444_formats"),
+        vk::PhysicalDeviceAttachmentFeedbackLoopLayoutFeaturesEXT::STRUCTURE_TYPE => {
+            Some(c"VK_EXT_attachment_feedback_loop_layout")
+        }
         vk::PhysicalDeviceBorderColorSwizzleFeaturesEXT::STRUCTURE_TYPE => {
             Some(c"VK_EXT_border_color_swizzle")
         }

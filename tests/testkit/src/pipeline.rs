@@ -98,6 +98,8 @@ pub struct Graphics<'a> {
     pub depth_format: vk::Format,
     /// The views of dynamic rendering, one bit each.
     pub view_mask: u32,
+    /// The flags of its creation.
+    pub flags: vk::PipelineCreateFlags,
     /// A render pass object and subpass, in place of dynamic rendering.
     pub subpass: Option<(vk::RenderPass, u32)>,
     /// The state of Gaussian draws.
@@ -137,6 +139,7 @@ impl Default for Graphics<'_> {
             formats: vec![vk::Format::R32G32B32A32_SFLOAT],
             depth_format: vk::Format::UNDEFINED,
             view_mask: 0,
+            flags: vk::PipelineCreateFlags::empty(),
             subpass: None,
             gaussian: None,
             approximation: None,
@@ -263,6 +266,7 @@ impl Graphics<'_> {
         let mut approximation = self.approximation.unwrap_or_default();
         let mut footprint = self.footprint.unwrap_or_default();
         let mut info = vk::GraphicsPipelineCreateInfo::default()
+            .flags(self.flags)
             .stages(stages)
             .vertex_input_state(&vertex_input)
             .input_assembly_state(&assembly)
@@ -387,6 +391,8 @@ pub struct PipelineOptions<'a> {
     pub subpass: Option<(vk::RenderPass, u32)>,
     /// The views of dynamic rendering, one bit each.
     pub view_mask: u32,
+    /// The flags of its creation.
+    pub flags: vk::PipelineCreateFlags,
 }
 
 impl Default for PipelineOptions<'_> {
@@ -420,6 +426,7 @@ impl Default for PipelineOptions<'_> {
             bindings: None,
             subpass: None,
             view_mask: 0,
+            flags: vk::PipelineCreateFlags::empty(),
         }
     }
 }
@@ -540,6 +547,7 @@ impl Pipeline {
             formats: formats.colors,
             depth_format: formats.depth,
             view_mask: options.view_mask,
+            flags: options.flags,
             subpass: options.subpass,
             ..Graphics::default()
         };
