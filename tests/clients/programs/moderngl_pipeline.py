@@ -27,6 +27,10 @@ context.memory_barrier()
 computed = np.frombuffer(sums.read(), "f4")
 assert np.array_equal(computed, values[0::2] + values[1::2]), "the sums differ"
 
+# Without a picture to draw to, OpenGL draws nothing.
+target = context.simple_framebuffer((64, 64), 4, dtype="f1")
+target.use()
+
 # Transform feedback: a geometry shader makes a strip of two triangles of each point.
 program = context.program(
     vertex_shader="""
@@ -57,9 +61,7 @@ expected = points[:, None, :] + corners
 order = [np.sort(part.reshape(1_000, 2, 3, 2).view("c8").reshape(1_000, 2, 3)) for part in (found.copy(), expected.copy())]
 assert np.array_equal(*order), "the captured triangles differ"
 
-# A tessellated quad that covers the middle of a picture.
-target = context.simple_framebuffer((64, 64), 4, dtype="f1")
-target.use()
+# A tessellated quad that covers the middle of the picture.
 target.clear()
 program = context.program(
     vertex_shader="#version 430\nvoid main() { gl_Position = vec4(0.0); }",
