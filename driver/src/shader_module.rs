@@ -143,27 +143,30 @@ fn declared(words: &[u32]) -> impl Iterator<Item = Capability> {
 }
 
 /// A shader stage of a pipeline.
-pub(crate) struct ShaderStage<'a> {
+#[derive(Clone, Debug)]
+pub(crate) struct ShaderStage {
     /// The shader module.
-    pub(crate) module: &'a ShaderModule,
+    pub(crate) module: Arc<ShaderModule>,
     /// The entry point's name.
-    pub(crate) name: &'a str,
+    pub(crate) name: String,
     /// Values of specialization constants.
     pub(crate) specialization: Specialization,
     /// The subgroup size that the stage requires.
     pub(crate) required_subgroup_size: Option<u32>,
 }
 
-impl<'a> ShaderStage<'a> {
+impl ShaderStage {
     /// The stage of a create info.
     ///
     /// # Errors
-    /// [`Error::InvalidUsage`] for an invalid name or subgroup size.
+    /// [`Error::InvalidUsage`] for an invalid name or subgroup size, or if there is no module; and the errors of
+    /// [`ShaderModule::new`] if the create info has the module's code.
     ///
     /// # Safety
     /// The create info and its chain are valid.
     pub(crate) unsafe fn from_create_info(
-        info: &'a vk::PipelineShaderStageCreateInfo<'a>,
+        device: &Device,
+        info: &vk::PipelineShaderStageCreateInfo<'_>,
     ) -> Result<Self, Error> {
         // SAFETY: the caller's promise.
         unsafe {
@@ -180,12 +183,42 @@ impl<'a> ShaderStage<'a> {
                 vk::PipelineShaderStageRequiredSubgroupSizeCreateInfo<'_>,
             >(info.p_next);
             Ok(Self {
-                module: handle::get(info.module)?,
-                name,
+                module: module(device, info)?,
+                name: name.to_owned(),
                 specialization: specialization(valid::optional(info.p_specialization_info))?,
                 required_subgroup_size: required.map(subgroup_size).transpose()?,
             })
         }
+    }
+}
+
+/// The module of a stage: the one that it names, or else that of the code in its chain.
+///
+/// # Safety
+/// The create info and its chain are valid.
+unsafe fn module(
+    device: &Device,
+    info: &vk::PipelineShaderStageCreateInfo<'_>,
+) -> Result<Arc<ShaderModule>, Error> {
+    // SAFETY: the caller's promise.
+    unsafe {
+        if let Some(module) = handle::get_optional(info.module)? {
+            return Ok(Arc::clone(module));
+        }
+        if !device.features().graphics_pipeline_library {
+            return Err(Error::usage(
+                "VUID-VkPipelineShaderStageCreateInfo-stage-08771",
+                "module is VK_NULL_HANDLE, and graphicsPipelineLibrary is not enabled",
+            ));
+        }
+        let code = valid::find_in_chain::<vk::ShaderModuleCreateInfo<'_>>(info.p_next);
+        let code = code.ok_or_else(|| {
+            Error::usage(
+                "VUID-VkPipelineShaderStageCreateInfo-stage-06845",
+                "module is VK_NULL_HANDLE, and the stage's chain has no VkShaderModuleCreateInfo",
+            )
+        })?;
+        create_shader_module(device, code)
     }
 }
 

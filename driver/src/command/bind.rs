@@ -9,7 +9,7 @@ use crate::descriptor::set::{self, UpdateTemplate};
 use crate::physical_device::limits;
 use crate::pipeline::Pipeline;
 use crate::pipeline::layout::PipelineLayout;
-use crate::pipeline::state::VertexInput;
+use crate::pipeline::parts::VertexInput;
 use crate::resource::buffer::{Buffer, BufferRules};
 use ash::vk;
 use simdevice::Allocation;
@@ -29,6 +29,12 @@ pub(crate) fn cmd_bind_pipeline(
         }
         (Pipeline::Compute(pipeline), vk::PipelineBindPoint::COMPUTE) => {
             Command::BindComputePipeline(Arc::clone(pipeline))
+        }
+        (Pipeline::Library(_), _) => {
+            return Err(Error::usage(
+                "VUID-vkCmdBindPipeline-pipeline-03382",
+                "the pipeline is a library",
+            ));
         }
         (_, other) => {
             return Err(Error::usage(

@@ -28,7 +28,7 @@ use crate::descriptor::set::{Descriptor, DescriptorSet, Write};
 use crate::pipeline::GraphicsPipeline;
 use crate::pipeline::compute::ComputePipeline;
 use crate::pipeline::dynamic_state::DynamicState;
-use crate::pipeline::state::VertexInput;
+use crate::pipeline::parts::VertexInput;
 use crate::query_pool::QueryPool;
 use crate::sync::Event;
 use ash::vk;

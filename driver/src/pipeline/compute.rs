@@ -29,7 +29,7 @@ impl ComputePipeline {
     pub(crate) fn new(
         device: &Device,
         layout: &PipelineLayout,
-        stage: &ShaderStage<'_>,
+        stage: &ShaderStage,
     ) -> Result<Self, Error> {
         let subgroup_size = stage
             .required_subgroup_size
@@ -42,7 +42,7 @@ impl ComputePipeline {
         let shader =
             stage
                 .module
-                .translate(stage.name, Stage::Compute, &stage.specialization, &options)?;
+                .translate(&stage.name, Stage::Compute, &stage.specialization, &options)?;
         let interface = &shader.interface;
         layout.check(interface)?;
         let invocations = invocations(interface)?;

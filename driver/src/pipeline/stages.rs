@@ -3,7 +3,8 @@
 
 use super::layout::PipelineLayout;
 use super::link;
-use super::state::{AttributeSource, VertexInputState, source};
+use super::parts::VertexInput;
+use super::state::{AttributeSource, source};
 use crate::abi::error::Error;
 use crate::device::Device;
 use crate::device_addresses::Addresses;
@@ -60,7 +61,7 @@ pub(crate) fn translate(
     };
     let shader = stage
         .module
-        .translate(stage.name, kind, &stage.specialization, &options)?;
+        .translate(&stage.name, kind, &stage.specialization, &options)?;
     layout.check(&shader.interface)?;
     if device.dumps_ir() {
         eprintln!("{kind} shader {}:\n{}", stage.name, shader.program);
@@ -73,7 +74,7 @@ pub(crate) fn translate(
 /// # Errors
 /// [`Error::InvalidUsage`] for a location without an attribute, or with an attribute of another numeric type.
 pub(crate) fn attributes(
-    info: &VertexInputState,
+    info: &VertexInput,
     locations: &[(u32, ScalarType)],
 ) -> Result<Vec<AttributeSource>, Error> {
     let source = |&(location, _): &(u32, ScalarType)| {

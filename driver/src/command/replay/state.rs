@@ -8,7 +8,7 @@ use crate::pipeline::GraphicsPipeline;
 use crate::pipeline::compute::ComputePipeline;
 use crate::pipeline::dynamic_state::DynamicStates;
 use crate::pipeline::gaussian::GaussianPipeline;
-use crate::pipeline::state::VertexInput;
+use crate::pipeline::parts::VertexInput;
 use simdevice::packet::GaussianBegin;
 use simdevice::state::gaussian::Camera;
 use simdevice::state::{DrawState, Rect, Viewport};
