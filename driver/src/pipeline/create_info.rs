@@ -204,17 +204,26 @@ unsafe fn read_rasterization(
             gvk::PipelineGaussianApproximationStateCreateInfoGAURAST<'_>,
         >(info.p_next)
         .map(|state| {
-            unchained!(state, gvk::PipelineGaussianApproximationStateCreateInfoGAURAST {
-                exponential_error, contribution_budget,
-            })
+            unchained!(
+                state,
+                gvk::PipelineGaussianApproximationStateCreateInfoGAURAST {
+                    exponential_error,
+                    contribution_budget,
+                }
+            )
         });
         own.footprint = valid::find_in_chain::<
             gvk::PipelineGaussianFootprintStateCreateInfoGAURAST<'_>,
         >(info.p_next)
         .map(|state| {
-            unchained!(state, gvk::PipelineGaussianFootprintStateCreateInfoGAURAST {
-                cut_off, cut_off_deviations, compensation_floor,
-            })
+            unchained!(
+                state,
+                gvk::PipelineGaussianFootprintStateCreateInfoGAURAST {
+                    cut_off,
+                    cut_off_deviations,
+                    compensation_floor,
+                }
+            )
         });
         if tessellates && let Some(state) = valid::optional(info.p_tessellation_state) {
             own.patch_control_points = state.patch_control_points;
@@ -294,8 +303,8 @@ unsafe fn read_output(
 ) -> Result<(), Error> {
     use vk::DynamicState as S;
     let has_dynamic_blending = gathered.has_dynamic_blending();
-    let [dynamic_mask, dynamic_enables] = [S::SAMPLE_MASK_EXT, S::COLOR_WRITE_ENABLE_EXT]
-        .map(|state| gathered.is_dynamic(state));
+    let [dynamic_mask, dynamic_enables] =
+        [S::SAMPLE_MASK_EXT, S::COLOR_WRITE_ENABLE_EXT].map(|state| gathered.is_dynamic(state));
     let own = &mut gathered.fragment_output;
     own.has_depth_stencil = subpass.has_depth_stencil;
     own.color_formats = subpass.color_formats;
@@ -394,37 +403,74 @@ impl Subpass {
 fn rasterization(
     state: &vk::PipelineRasterizationStateCreateInfo<'_>,
 ) -> vk::PipelineRasterizationStateCreateInfo<'static> {
-    unchained!(state, vk::PipelineRasterizationStateCreateInfo {
-        flags, depth_clamp_enable, rasterizer_discard_enable, polygon_mode, cull_mode, front_face, depth_bias_enable,
-        depth_bias_constant_factor, depth_bias_clamp, depth_bias_slope_factor, line_width,
-    })
+    unchained!(
+        state,
+        vk::PipelineRasterizationStateCreateInfo {
+            flags,
+            depth_clamp_enable,
+            rasterizer_discard_enable,
+            polygon_mode,
+            cull_mode,
+            front_face,
+            depth_bias_enable,
+            depth_bias_constant_factor,
+            depth_bias_clamp,
+            depth_bias_slope_factor,
+            line_width,
+        }
+    )
 }
 
 fn line_rasterization(
     state: &vk::PipelineRasterizationLineStateCreateInfoKHR<'_>,
 ) -> vk::PipelineRasterizationLineStateCreateInfoKHR<'static> {
-    unchained!(state, vk::PipelineRasterizationLineStateCreateInfoKHR {
-        line_rasterization_mode, stippled_line_enable, line_stipple_factor, line_stipple_pattern,
-    })
+    unchained!(
+        state,
+        vk::PipelineRasterizationLineStateCreateInfoKHR {
+            line_rasterization_mode,
+            stippled_line_enable,
+            line_stipple_factor,
+            line_stipple_pattern,
+        }
+    )
 }
 
 fn depth_stencil(
     state: &vk::PipelineDepthStencilStateCreateInfo<'_>,
 ) -> vk::PipelineDepthStencilStateCreateInfo<'static> {
-    unchained!(state, vk::PipelineDepthStencilStateCreateInfo {
-        flags, depth_test_enable, depth_write_enable, depth_compare_op, depth_bounds_test_enable, stencil_test_enable,
-        front, back, min_depth_bounds, max_depth_bounds,
-    })
+    unchained!(
+        state,
+        vk::PipelineDepthStencilStateCreateInfo {
+            flags,
+            depth_test_enable,
+            depth_write_enable,
+            depth_compare_op,
+            depth_bounds_test_enable,
+            stencil_test_enable,
+            front,
+            back,
+            min_depth_bounds,
+            max_depth_bounds,
+        }
+    )
 }
 
 /// Multisample state without the pointer to the mask.
 fn multisample(
     state: &vk::PipelineMultisampleStateCreateInfo<'_>,
 ) -> vk::PipelineMultisampleStateCreateInfo<'static> {
-    let copy = unchained!(state, vk::PipelineMultisampleStateCreateInfo {
-        flags, rasterization_samples, sample_shading_enable, min_sample_shading, p_sample_mask,
-        alpha_to_coverage_enable, alpha_to_one_enable,
-    });
+    let copy = unchained!(
+        state,
+        vk::PipelineMultisampleStateCreateInfo {
+            flags,
+            rasterization_samples,
+            sample_shading_enable,
+            min_sample_shading,
+            p_sample_mask,
+            alpha_to_coverage_enable,
+            alpha_to_one_enable,
+        }
+    );
     vk::PipelineMultisampleStateCreateInfo {
         p_sample_mask: std::ptr::null(),
         ..copy
@@ -434,9 +480,28 @@ fn multisample(
 fn gaussian(
     state: &gvk::PipelineGaussianStateCreateInfoGAURAST<'_>,
 ) -> gvk::PipelineGaussianStateCreateInfoGAURAST<'static> {
-    unchained!(state, gvk::PipelineGaussianStateCreateInfoGAURAST {
-        flags, projection_mode, geometry, linearization, spherical_harmonics_degree, attribute_locations,
-        vertex_output_locations, resolve_input_locations, order, precision, antialiasing, low_pass_variance,
-        alpha_floor, alpha_ceiling, transmittance_floor, camera_source, camera_set, camera_binding, camera_count,
-    })
+    unchained!(
+        state,
+        gvk::PipelineGaussianStateCreateInfoGAURAST {
+            flags,
+            projection_mode,
+            geometry,
+            linearization,
+            spherical_harmonics_degree,
+            attribute_locations,
+            vertex_output_locations,
+            resolve_input_locations,
+            order,
+            precision,
+            antialiasing,
+            low_pass_variance,
+            alpha_floor,
+            alpha_ceiling,
+            transmittance_floor,
+            camera_source,
+            camera_set,
+            camera_binding,
+            camera_count,
+        }
+    )
 }

@@ -246,7 +246,9 @@ impl GraphicsState {
     }
 
     /// Depth and stencil state, if the subpass has such an attachment.
-    pub(crate) fn depth_stencil(&self) -> Option<&vk::PipelineDepthStencilStateCreateInfo<'static>> {
+    pub(crate) fn depth_stencil(
+        &self,
+    ) -> Option<&vk::PipelineDepthStencilStateCreateInfo<'static>> {
         let state = self.fragment_shader.depth_stencil.as_ref();
         state.filter(|_| self.fragment_output.has_depth_stencil)
     }

@@ -4,8 +4,8 @@ use super::dynamic_state;
 use super::layout::PipelineLayout;
 use super::link::{self, StageShaders};
 use super::link_primitives::{self, TessellationShaders};
-use super::stages::{self, ProgramResources};
 use super::parts::GraphicsState;
+use super::stages::{self, ProgramResources};
 use super::state::{
     self, AttributeSource, Class, FixedFunctionState, live_color_outputs, reads_second_source,
 };

@@ -4,8 +4,8 @@ use crate::abi::error::Error;
 use crate::device::Device;
 use crate::pipeline::layout::PipelineLayout;
 use crate::pipeline::link;
-use crate::pipeline::stages::{self, ProgramResources};
 use crate::pipeline::parts::GraphicsState;
+use crate::pipeline::stages::{self, ProgramResources};
 use crate::pipeline::state::{
     AttributeSource, FixedFunctionState, live_color_outputs, reads_second_source,
 };
