@@ -23,73 +23,71 @@ macro_rules! unchained {
     }};
 }
 
-impl GraphicsState {
-    /// Links the libraries of a create info, and reads the parts that it has itself. Pointers that the rest makes
-    /// irrelevant may be invalid.
-    ///
-    /// # Errors
-    /// An [`Error`] that names the valid usage broken.
-    ///
-    /// # Safety
-    /// The create info and its chain are valid.
-    pub(crate) unsafe fn from_create_info(
-        device: &Device,
-        info: &vk::GraphicsPipelineCreateInfo<'_>,
-        libraries: &[&GraphicsState],
-    ) -> Result<Self, Error> {
-        let mut gathered = GraphicsState::default();
-        for library in libraries {
-            gathered.link(library)?;
-        }
-        // SAFETY: the caller's promise.
-        unsafe {
-            let parts = parts(info, !libraries.is_empty());
-            gathered.claim(parts)?;
-            if let Some(state) = valid::optional(info.p_dynamic_state) {
-                let dynamic = valid::slice(state.p_dynamic_states, state.dynamic_state_count)?;
-                let own = dynamic.iter().filter(|&&state| {
-                    dynamic_state::part(state).is_none_or(|part| parts.contains(part))
-                });
-                gathered.dynamic.extend(own);
-            }
-            let shaders = Parts::PRE_RASTERIZATION_SHADERS | Parts::FRAGMENT_SHADER;
-            if parts.intersects(shaders) {
-                if let Some(layout) = handle::get_optional(info.layout)? {
-                    gathered.add_layout(layout);
-                }
-                read_stages(device, info, parts, &mut gathered)?;
-            }
-            if parts.contains(Parts::VERTEX_INPUT_INTERFACE) {
-                read_vertex_input(info, &mut gathered)?;
-            }
-            if parts.contains(Parts::PRE_RASTERIZATION_SHADERS) {
-                read_rasterization(info, &mut gathered)?;
-            }
-            let draws = !gathered.discards();
-            let has_output = draws && parts.contains(Parts::FRAGMENT_OUTPUT_INTERFACE);
-            let subpass = if parts.intersects(shaders | Parts::FRAGMENT_OUTPUT_INTERFACE) {
-                Subpass::new(info, has_output)?
-            } else {
-                Subpass::default()
-            };
-            if parts.contains(Parts::PRE_RASTERIZATION_SHADERS) {
-                gathered.pre_rasterization.view_mask = subpass.view_mask;
-            }
-            if draws && parts.contains(Parts::FRAGMENT_SHADER) {
-                // Without a render pass, formats say whether there is such an attachment; the fragment output
-                // interface has them.
-                let is_unknown = info.render_pass == vk::RenderPass::null() && !has_output;
-                if subpass.has_depth_stencil || is_unknown {
-                    gathered.fragment_shader.depth_stencil =
-                        valid::optional(info.p_depth_stencil_state).map(depth_stencil);
-                }
-            }
-            if has_output {
-                read_output(info, subpass, &mut gathered)?;
-            }
-        }
-        Ok(gathered)
+/// Links the libraries of a create info, and reads the parts that it has itself. Pointers that the rest makes
+/// irrelevant may be invalid.
+///
+/// # Errors
+/// An [`Error`] that names the valid usage broken.
+///
+/// # Safety
+/// The create info and its chain are valid.
+pub(super) unsafe fn read(
+    device: &Device,
+    info: &vk::GraphicsPipelineCreateInfo<'_>,
+    libraries: &[&GraphicsState],
+) -> Result<GraphicsState, Error> {
+    let mut gathered = GraphicsState::default();
+    for library in libraries {
+        gathered.link(library)?;
     }
+    // SAFETY: the caller's promise.
+    unsafe {
+        let parts = parts(info, !libraries.is_empty());
+        gathered.claim(parts)?;
+        if let Some(state) = valid::optional(info.p_dynamic_state) {
+            let dynamic = valid::slice(state.p_dynamic_states, state.dynamic_state_count)?;
+            let own = dynamic.iter().filter(|&&state| {
+                dynamic_state::part(state).is_none_or(|part| parts.contains(part))
+            });
+            gathered.dynamic.extend(own);
+        }
+        let shaders = Parts::PRE_RASTERIZATION_SHADERS | Parts::FRAGMENT_SHADER;
+        if parts.intersects(shaders) {
+            if let Some(layout) = handle::get_optional(info.layout)? {
+                gathered.add_layout(layout);
+            }
+            read_stages(device, info, parts, &mut gathered)?;
+        }
+        if parts.contains(Parts::VERTEX_INPUT_INTERFACE) {
+            read_vertex_input(info, &mut gathered)?;
+        }
+        if parts.contains(Parts::PRE_RASTERIZATION_SHADERS) {
+            read_rasterization(info, &mut gathered)?;
+        }
+        let draws = !gathered.discards();
+        let has_output = draws && parts.contains(Parts::FRAGMENT_OUTPUT_INTERFACE);
+        let subpass = if parts.intersects(shaders | Parts::FRAGMENT_OUTPUT_INTERFACE) {
+            Subpass::new(info, has_output)?
+        } else {
+            Subpass::default()
+        };
+        if parts.contains(Parts::PRE_RASTERIZATION_SHADERS) {
+            gathered.pre_rasterization.view_mask = subpass.view_mask;
+        }
+        if draws && parts.contains(Parts::FRAGMENT_SHADER) {
+            // Without a render pass, formats say whether there is such an attachment; the fragment output
+            // interface has them.
+            let is_unknown = info.render_pass == vk::RenderPass::null() && !has_output;
+            if subpass.has_depth_stencil || is_unknown {
+                gathered.fragment_shader.depth_stencil =
+                    valid::optional(info.p_depth_stencil_state).map(depth_stencil);
+            }
+        }
+        if has_output {
+            read_output(info, subpass, &mut gathered)?;
+        }
+    }
+    Ok(gathered)
 }
 
 /// The parts that a create info has itself, beside those of the libraries that it links.

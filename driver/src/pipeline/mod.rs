@@ -142,7 +142,7 @@ unsafe fn new_graphics_pipeline(
     // SAFETY: the caller's promise.
     let gathered = unsafe {
         write_empty_creation_feedback(info.p_next)?;
-        GraphicsState::from_create_info(device, info, &libraries(info)?)?
+        create_info::read(device, info, &libraries(info)?)?
     };
     if is_library {
         return Ok(Pipeline::Library(Box::new(gathered)));
