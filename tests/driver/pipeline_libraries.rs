@@ -481,6 +481,16 @@ fn independent_sets_are_united() {
     let pipeline = create(gpu, &link(&independent, &libraries));
     drop(libraries);
     assert!(drawn(&pipeline) == expected);
+    // A set that no stage uses may be null.
+    let drawn_at_once = draw(gpu, &pipeline, |commands| {
+        let (device, raw) = commands.raw();
+        let handles = [sets[0].set, vk::DescriptorSet::null(), sets[2].set];
+        let (layout, point) = (pipeline.layout, vk::PipelineBindPoint::GRAPHICS);
+        // SAFETY: the command buffer records, and sets that are not null have the layouts of their numbers.
+        unsafe { device.cmd_bind_descriptor_sets(raw, point, layout, 0, &handles, &[]) };
+        commands.push(0, &[-0.05f32, 0.1, 0.0, 0.0]);
+    });
+    assert!(drawn_at_once == expected);
     // The fragment stage of a library with the vertex stage's layout lacks its set.
     let libraries = [
         of(input, &[]),

@@ -153,8 +153,8 @@ pub(crate) struct BindSets {
     pub(crate) bind_point: BindPoint,
     /// The first set's number.
     pub(crate) first: u32,
-    /// The sets.
-    pub(crate) sets: Vec<BoundSet>,
+    /// The sets; `None` for one that pipeline layouts with independent sets lack.
+    pub(crate) sets: Vec<Option<BoundSet>>,
 }
 
 /// Descriptors to be pushed.

@@ -124,9 +124,9 @@ pub(crate) struct BoundSets(Vec<Option<BoundSet>>);
 
 impl BoundSets {
     /// Binds sets from number `first` on.
-    pub(crate) fn bind(&mut self, first: u32, sets: &[BoundSet]) {
+    pub(crate) fn bind(&mut self, first: u32, sets: &[Option<BoundSet>]) {
         for (number, set) in (first..).zip(sets) {
-            *slot(&mut self.0, number) = Some(set.clone());
+            slot(&mut self.0, number).clone_from(set);
         }
     }
 
@@ -151,7 +151,7 @@ impl BoundSets {
                     set: Arc::clone(&set),
                     dynamic_offsets: Vec::new(),
                 };
-                self.bind(number, &[bound]);
+                self.bind(number, &[Some(bound)]);
                 set
             }
         };
