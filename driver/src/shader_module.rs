@@ -14,7 +14,7 @@ use gaurast_spirv::{Module, Options, Shader, Specialization, Stage, is_supported
 use simdevice::host;
 use spirv::{Capability, Op};
 use std::ffi::CStr;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// The first word of a SPIR-V module.
 const MAGIC: u32 = 0x0723_0203;
@@ -51,7 +51,7 @@ impl ShaderModule {
     ///
     /// # Errors
     /// [`Error::InvalidShader`] names the instruction that is malformed or not supported.
-    pub(crate) fn translate(
+    fn translate(
         &self,
         name: &str,
         stage: Stage,
@@ -146,14 +146,19 @@ fn declared(words: &[u32]) -> impl Iterator<Item = Capability> {
 #[derive(Clone, Debug)]
 pub(crate) struct ShaderStage {
     /// The shader module.
-    pub(crate) module: Arc<ShaderModule>,
+    module: Arc<ShaderModule>,
     /// The entry point's name.
     pub(crate) name: String,
     /// Values of specialization constants.
-    pub(crate) specialization: Specialization,
+    specialization: Specialization,
     /// The subgroup size that the stage requires.
     pub(crate) required_subgroup_size: Option<u32>,
+    /// The last translation of a library's stage, with its options; `None` for a stage of a pipeline.
+    translated: Option<Arc<Mutex<Translation>>>,
 }
+
+/// A shader and the options that it was translated with; `None` before the first translation.
+type Translation = Option<(Options, Shader)>;
 
 impl ShaderStage {
     /// The stage of a create info.
@@ -187,7 +192,38 @@ impl ShaderStage {
                 name: name.to_owned(),
                 specialization: specialization(valid::optional(info.p_specialization_info))?,
                 required_subgroup_size: required.map(subgroup_size).transpose()?,
+                translated: None,
             })
+        }
+    }
+
+    /// Makes the stage one of a library, of which translations are kept. Returns false if it is one already.
+    pub(crate) fn keep_translations(&mut self) -> bool {
+        let is_new = self.translated.is_none();
+        self.translated.get_or_insert_default();
+        is_new
+    }
+
+    /// The stage's shader, which is translated unless the last translation of a library's stage had the same options.
+    ///
+    /// # Errors
+    /// [`Error::InvalidShader`] names the instruction that is malformed or not supported.
+    pub(crate) fn translate(&self, kind: Stage, options: &Options) -> Result<Shader, Error> {
+        let new = || {
+            let (name, constants) = (&self.name, &self.specialization);
+            self.module.translate(name, kind, constants, options)
+        };
+        let Some(last) = &self.translated else {
+            return new();
+        };
+        let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
+        match &*last {
+            Some((of, shader)) if of == options => Ok(shader.clone()),
+            _ => {
+                let shader = new()?;
+                *last = Some((*options, shader.clone()));
+                Ok(shader)
+            }
         }
     }
 }

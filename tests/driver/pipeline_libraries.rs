@@ -225,7 +225,15 @@ fn mixed<'a>(one: &Graphics<'a>, second: &Graphics<'a>, parts: Parts) -> Graphic
 
 /// The picture of the triangles, with a depth between theirs at first.
 fn draw(gpu: &Gpu, pipeline: &Pipeline, record: impl FnOnce(&Commands)) -> Output {
-    let target = target(gpu);
+    draw_to(gpu, &target(gpu), pipeline, record)
+}
+
+fn draw_to(
+    gpu: &Gpu,
+    target: &Target,
+    pipeline: &Pipeline,
+    record: impl FnOnce(&Commands),
+) -> Output {
     let vertices = Buffer::of(gpu, &triangles());
     let pass = Pass {
         depth: vk::ClearDepthStencilValue {
@@ -492,21 +500,48 @@ fn independent_sets_are_united() {
     });
     assert!(drawn_at_once == expected);
     // The fragment stage of a library with the vertex stage's layout lacks its set.
-    let libraries = [
-        of(input, &[]),
-        of(vertex, &[layouts[0]]),
-        of(fragment, &[layouts[0]]),
-        of(output, &[]),
-    ];
-    refused(
-        gpu,
-        &Graphics {
-            set_layouts: Vec::new(),
-            ..link(&independent, &libraries)
-        },
-        vk::Result::ERROR_VALIDATION_FAILED_EXT,
-        "VUID-VkGraphicsPipelineCreateInfo-layout-07988",
-    );
+    let lacking = Graphics {
+        set_layouts: vec![layouts[0]],
+        ..library(&independent, fragment)
+    };
+    let result = vk::Result::ERROR_VALIDATION_FAILED_EXT;
+    let rule = "VUID-VkGraphicsPipelineCreateInfo-layout-07988";
+    refused(gpu, &lacking, result, rule);
+}
+
+/// A library's shader is translated again for pipelines that need it otherwise: `interpolateAtSample` needs the number of
+/// samples.
+#[gaurast_runner::test(needs = [GLSLANG])]
+fn a_library_is_linked_for_any_number_of_samples() {
+    let gpu = device();
+    let sampled = "
+        layout(location = 0) in vec4 v_color;
+        layout(location = 0) out vec4 color;
+        void main() { color = interpolateAtSample(v_color, 1); }";
+    let target = |samples| {
+        let options = TargetOptions {
+            size: SIZE,
+            samples,
+            ..TargetOptions::with_depth(vk::Format::D32_SFLOAT_S8_UINT)
+        };
+        Target::new(gpu, &options)
+    };
+    let (one, four) = (target(1), target(4));
+    let of = |target: &Target| plain(target).with_shader(fragment(sampled));
+    let shaders = create(gpu, &library(&of(&one), ALL[1] | ALL[2]));
+    for _ in 0..2 {
+        for target in [&one, &four] {
+            let own = of(target);
+            let linked = Graphics {
+                parts: Some(ALL[0] | ALL[3]),
+                libraries: vec![shaders.raw],
+                shaders: Vec::new(),
+                ..own.clone()
+            };
+            let expected = draw_to(gpu, target, &create(gpu, &own), |_| {});
+            assert!(draw_to(gpu, target, &create(gpu, &linked), |_| {}) == expected);
+        }
+    }
 }
 
 /// A pipeline that rasterizes nothing needs no parts for fragments; others need all.

@@ -429,7 +429,7 @@ fn find_properties() -> Properties {
         max_buffer_size: memory::heap_size(),
         provoking_vertex_mode_per_pipeline: true,
         transform_feedback_preserves_triangle_fan_provoking_vertex: false,
-        // Shaders are translated when libraries are linked.
+        // Programs are compiled when libraries are linked.
         graphics_pipeline_library_fast_linking: false,
         // The fragment stage alone says how its inputs are interpolated.
         graphics_pipeline_library_independent_interpolation_decoration: true,

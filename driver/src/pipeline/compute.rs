@@ -39,10 +39,7 @@ impl ComputePipeline {
             unsized_descriptors: layout.longest_binding(),
             ..Options::default()
         };
-        let shader =
-            stage
-                .module
-                .translate(&stage.name, Stage::Compute, &stage.specialization, &options)?;
+        let shader = stage.translate(Stage::Compute, &options)?;
         let interface = &shader.interface;
         layout.check(interface)?;
         let invocations = invocations(interface)?;

@@ -1,7 +1,8 @@
 //! Pipelines: the parts of create infos that draws and dispatches use, converted and validated once.
 //!
 //! A graphics pipeline's create info is read into the parts that it has ([`GraphicsState`]), beside those of the libraries
-//! that it links. A library keeps its parts; a pipeline is made of all of them, so shaders are translated when it is linked.
+//! that it links. A library keeps its parts, with its shaders translated; a pipeline is made of all of them, for which the
+//! programs are compiled.
 //!
 //! `create_info` and [`ShaderStage`] follow the create infos' pointers.
 
@@ -140,11 +141,12 @@ unsafe fn new_graphics_pipeline(
         });
     }
     // SAFETY: the caller's promise.
-    let gathered = unsafe {
+    let mut gathered = unsafe {
         write_empty_creation_feedback(info.p_next)?;
         create_info::read(device, info, &libraries(info)?)?
     };
     if is_library {
+        stages::translate_library(device, &mut gathered)?;
         return Ok(Pipeline::Library(Box::new(gathered)));
     }
     gathered.require_complete()?;

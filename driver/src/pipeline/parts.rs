@@ -245,6 +245,14 @@ impl GraphicsState {
         before.iter().chain(fragment)
     }
 
+    /// The shader stages, to be changed.
+    pub(super) fn stages_mut(
+        &mut self,
+    ) -> impl Iterator<Item = &mut (vk::ShaderStageFlags, ShaderStage)> {
+        let before = self.pre_rasterization.stages.iter_mut();
+        before.chain(&mut self.fragment_shader.stages)
+    }
+
     /// Depth and stencil state, if the subpass has such an attachment.
     pub(crate) fn depth_stencil(
         &self,
