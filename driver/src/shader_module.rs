@@ -14,7 +14,7 @@ use gaurast_spirv::{Module, Options, Shader, Specialization, Stage, is_supported
 use simdevice::host;
 use spirv::{Capability, Op};
 use std::ffi::CStr;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// The first word of a SPIR-V module.
 const MAGIC: u32 = 0x0723_0203;
@@ -51,7 +51,7 @@ impl ShaderModule {
     ///
     /// # Errors
     /// [`Error::InvalidShader`] names the instruction that is malformed or not supported.
-    pub(crate) fn translate(
+    fn translate(
         &self,
         name: &str,
         stage: Stage,
@@ -143,27 +143,35 @@ fn declared(words: &[u32]) -> impl Iterator<Item = Capability> {
 }
 
 /// A shader stage of a pipeline.
-pub(crate) struct ShaderStage<'a> {
+#[derive(Clone, Debug)]
+pub(crate) struct ShaderStage {
     /// The shader module.
-    pub(crate) module: &'a ShaderModule,
+    module: Arc<ShaderModule>,
     /// The entry point's name.
-    pub(crate) name: &'a str,
+    pub(crate) name: String,
     /// Values of specialization constants.
-    pub(crate) specialization: Specialization,
+    specialization: Specialization,
     /// The subgroup size that the stage requires.
     pub(crate) required_subgroup_size: Option<u32>,
+    /// The last translation of a library's stage, with its options; `None` for a stage of a pipeline.
+    translated: Option<Arc<Mutex<Translation>>>,
 }
 
-impl<'a> ShaderStage<'a> {
+/// A shader and the options that it was translated with; `None` before the first translation.
+type Translation = Option<(Options, Shader)>;
+
+impl ShaderStage {
     /// The stage of a create info.
     ///
     /// # Errors
-    /// [`Error::InvalidUsage`] for an invalid name or subgroup size.
+    /// [`Error::InvalidUsage`] for an invalid name or subgroup size, or if there is no module; and the errors of
+    /// [`ShaderModule::new`] if the create info has the module's code.
     ///
     /// # Safety
     /// The create info and its chain are valid.
     pub(crate) unsafe fn from_create_info(
-        info: &'a vk::PipelineShaderStageCreateInfo<'a>,
+        device: &Device,
+        info: &vk::PipelineShaderStageCreateInfo<'_>,
     ) -> Result<Self, Error> {
         // SAFETY: the caller's promise.
         unsafe {
@@ -180,12 +188,73 @@ impl<'a> ShaderStage<'a> {
                 vk::PipelineShaderStageRequiredSubgroupSizeCreateInfo<'_>,
             >(info.p_next);
             Ok(Self {
-                module: handle::get(info.module)?,
-                name,
+                module: module(device, info)?,
+                name: name.to_owned(),
                 specialization: specialization(valid::optional(info.p_specialization_info))?,
                 required_subgroup_size: required.map(subgroup_size).transpose()?,
+                translated: None,
             })
         }
+    }
+
+    /// Makes the stage one of a library, of which translations are kept. Returns false if it is one already.
+    pub(crate) fn keep_translations(&mut self) -> bool {
+        let is_new = self.translated.is_none();
+        self.translated.get_or_insert_default();
+        is_new
+    }
+
+    /// The stage's shader, which is translated unless the last translation of a library's stage had the same options.
+    ///
+    /// # Errors
+    /// [`Error::InvalidShader`] names the instruction that is malformed or not supported.
+    pub(crate) fn translate(&self, kind: Stage, options: &Options) -> Result<Shader, Error> {
+        let new = || {
+            let (name, constants) = (&self.name, &self.specialization);
+            self.module.translate(name, kind, constants, options)
+        };
+        let Some(last) = &self.translated else {
+            return new();
+        };
+        let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
+        match &*last {
+            Some((of, shader)) if of == options => Ok(shader.clone()),
+            _ => {
+                let shader = new()?;
+                *last = Some((*options, shader.clone()));
+                Ok(shader)
+            }
+        }
+    }
+}
+
+/// The module of a stage: the one that it names, or else that of the code in its chain.
+///
+/// # Safety
+/// The create info and its chain are valid.
+unsafe fn module(
+    device: &Device,
+    info: &vk::PipelineShaderStageCreateInfo<'_>,
+) -> Result<Arc<ShaderModule>, Error> {
+    // SAFETY: the caller's promise.
+    unsafe {
+        if let Some(module) = handle::get_optional(info.module)? {
+            return Ok(Arc::clone(module));
+        }
+        if !device.features().graphics_pipeline_library {
+            return Err(Error::usage(
+                "VUID-VkPipelineShaderStageCreateInfo-stage-08771",
+                "module is VK_NULL_HANDLE, and graphicsPipelineLibrary is not enabled",
+            ));
+        }
+        let code = valid::find_in_chain::<vk::ShaderModuleCreateInfo<'_>>(info.p_next);
+        let code = code.ok_or_else(|| {
+            Error::usage(
+                "VUID-VkPipelineShaderStageCreateInfo-stage-06845",
+                "module is VK_NULL_HANDLE, and the stage's chain has no VkShaderModuleCreateInfo",
+            )
+        })?;
+        create_shader_module(device, code)
     }
 }
 

@@ -12,6 +12,7 @@ mod geometry_shaders;
 mod limits;
 mod loader_door;
 mod multiview;
+mod pipeline_libraries;
 mod pipelines;
 mod presentation;
 mod primitive_stages;

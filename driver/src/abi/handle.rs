@@ -182,16 +182,8 @@ impl<'a, H: Handle> Handles<'a, H> {
         self.0.len()
     }
 
-    /// The handles' objects; [`Error::InvalidHandle`] for a handle that is null or of another type.
-    pub(crate) fn objects(self) -> impl Iterator<Item = Result<&'a Arc<H::Object>, Error>> {
-        // SAFETY: the promise of `new`.
-        self.0.iter().map(|&handle| unsafe { get(handle) })
-    }
-
     /// The handles' objects, `None` for null handles; [`Error::InvalidHandle`] for a handle of another type.
-    pub(crate) fn optional_objects(
-        self,
-    ) -> impl Iterator<Item = Result<Option<&'a Arc<H::Object>>, Error>> {
+    pub(crate) fn objects(self) -> impl Iterator<Item = Result<Option<&'a Arc<H::Object>>, Error>> {
         // SAFETY: the promise of `new`.
         self.0.iter().map(|&handle| unsafe { get_optional(handle) })
     }

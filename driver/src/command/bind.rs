@@ -9,7 +9,7 @@ use crate::descriptor::set::{self, UpdateTemplate};
 use crate::physical_device::limits;
 use crate::pipeline::Pipeline;
 use crate::pipeline::layout::PipelineLayout;
-use crate::pipeline::state::VertexInput;
+use crate::pipeline::parts::VertexInput;
 use crate::resource::buffer::{Buffer, BufferRules};
 use ash::vk;
 use simdevice::Allocation;
@@ -29,6 +29,12 @@ pub(crate) fn cmd_bind_pipeline(
         }
         (Pipeline::Compute(pipeline), vk::PipelineBindPoint::COMPUTE) => {
             Command::BindComputePipeline(Arc::clone(pipeline))
+        }
+        (Pipeline::Library(_), _) => {
+            return Err(Error::usage(
+                "VUID-vkCmdBindPipeline-pipeline-03382",
+                "the pipeline is a library",
+            ));
         }
         (_, other) => {
             return Err(Error::usage(
@@ -159,7 +165,7 @@ fn bind_vertex_buffers(
             format!("there are {bindings} vertex input bindings"),
         ));
     }
-    for (index, (buffer, &offset)) in buffers.optional_objects().zip(offsets).enumerate() {
+    for (index, (buffer, &offset)) in buffers.objects().zip(offsets).enumerate() {
         let size = sizes.get(index).copied().unwrap_or(vk::WHOLE_SIZE);
         let range = match buffer? {
             Some(buffer) => {
@@ -189,17 +195,20 @@ pub(crate) fn cmd_bind_descriptor_sets(
     let mut rest = dynamic_offsets;
     let mut bound = simdevice::host::with_capacity(descriptor_sets.len());
     for (number, set) in (first_set..).zip(descriptor_sets.objects()) {
-        let set = set?;
+        let Some(set) = set? else {
+            bound.push(None);
+            continue;
+        };
         layout.set_layout(number)?;
         let count = set.layout().dynamic_count();
         let Some((own, others)) = rest.split_at_checked(count) else {
             return Err(dynamic_offset_count_error());
         };
         rest = others;
-        bound.push(BoundSet {
+        bound.push(Some(BoundSet {
             set: Arc::clone(set),
             dynamic_offsets: own.to_vec(),
-        });
+        }));
     }
     if !rest.is_empty() {
         return Err(dynamic_offset_count_error());

@@ -29,7 +29,7 @@ use crate::descriptor::set::{Descriptor, DescriptorSet, Write};
 use crate::pipeline::GraphicsPipeline;
 use crate::pipeline::compute::ComputePipeline;
 use crate::pipeline::dynamic_state::DynamicState;
-use crate::pipeline::state::VertexInput;
+use crate::pipeline::parts::VertexInput;
 use crate::query_pool::QueryPool;
 use crate::sync::Event;
 use ash::vk;
@@ -177,8 +177,8 @@ pub(crate) struct BindSets {
     pub(crate) bind_point: BindPoint,
     /// The first set's number.
     pub(crate) first: u32,
-    /// The sets.
-    pub(crate) sets: Vec<BoundSet>,
+    /// The sets; `None` for one that pipeline layouts with independent sets lack.
+    pub(crate) sets: Vec<Option<BoundSet>>,
 }
 
 /// Descriptors to be pushed.

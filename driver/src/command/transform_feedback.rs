@@ -78,7 +78,7 @@ fn require_bindings(first: u32, count: usize, vuid: &'static str) -> Result<(), 
 pub(crate) fn cmd_bind_transform_feedback_buffers(
     recorder: &mut Recorder,
     first_binding: u32,
-    buffers: Handles<'_, vk::Buffer>,
+    buffers: &[Arc<Buffer>],
     offsets: &[vk::DeviceSize],
     sizes: Option<&[vk::DeviceSize]>,
 ) -> Result<(), Error> {
@@ -92,7 +92,7 @@ pub(crate) fn cmd_bind_transform_feedback_buffers(
         buffers.len(),
         "VUID-vkCmdBindTransformFeedbackBuffersEXT-firstBinding-02357",
     )?;
-    for (number, (buffer, &offset)) in buffers.objects().zip(offsets).enumerate() {
+    for (number, (buffer, &offset)) in buffers.iter().zip(offsets).enumerate() {
         if !offset.is_multiple_of(4) {
             return Err(Error::usage(
                 "VUID-vkCmdBindTransformFeedbackBuffersEXT-pOffsets-02359",
@@ -103,7 +103,7 @@ pub(crate) fn cmd_bind_transform_feedback_buffers(
         let size = (size != vk::WHOLE_SIZE).then_some(size);
         recorder.push(Command::BindTransformFeedbackBuffer {
             binding: first_binding + number as u32,
-            buffer: buffer?.range(offset, size, &CAPTURED)?,
+            buffer: buffer.range(offset, size, &CAPTURED)?,
         });
     }
     Ok(())
@@ -121,7 +121,7 @@ fn counter_words(
         return Ok(words);
     };
     require_bindings(first, buffers.len(), rules.count)?;
-    for (number, buffer) in buffers.optional_objects().enumerate() {
+    for (number, buffer) in buffers.objects().enumerate() {
         let offset = offsets.map_or(0, |offsets| offsets[number]);
         if let Some(buffer) = buffer? {
             if !offset.is_multiple_of(4) {

@@ -5307,7 +5307,7 @@ unsafe extern "system" fn vkCmdBindTransformFeedbackBuffersEXT(
                         crate::command::transform_feedback::cmd_bind_transform_feedback_buffers(
                             recorder,
                             first_binding,
-                            handle::Handles::new(valid::slice(p_buffers, binding_count)?),
+                            &handle::get_all(valid::slice(p_buffers, binding_count)?)?,
                             valid::slice(p_offsets, binding_count)?,
                             (!p_sizes.is_null())
                                 .then(|| valid::slice(p_sizes, binding_count))

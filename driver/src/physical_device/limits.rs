@@ -444,6 +444,10 @@ fn find_properties() -> Properties {
         transform_feedback_streams_lines_triangles: true,
         transform_feedback_rasterization_stream_select: true,
         transform_feedback_draw: true,
+        // Programs are compiled when libraries are linked.
+        graphics_pipeline_library_fast_linking: false,
+        // The fragment stage alone says how its inputs are interpolated.
+        graphics_pipeline_library_independent_interpolation_decoration: true,
         max_vertex_attrib_divisor: u32::MAX,
         tile_size: vk::Extent2D {
             width: 16,

@@ -29,7 +29,7 @@ impl ComputePipeline {
     pub(crate) fn new(
         device: &Device,
         layout: &PipelineLayout,
-        stage: &ShaderStage<'_>,
+        stage: &ShaderStage,
     ) -> Result<Self, Error> {
         let subgroup_size = stage
             .required_subgroup_size
@@ -39,10 +39,7 @@ impl ComputePipeline {
             unsized_descriptors: layout.longest_binding(),
             ..Options::default()
         };
-        let shader =
-            stage
-                .module
-                .translate(stage.name, Stage::Compute, &stage.specialization, &options)?;
+        let shader = stage.translate(Stage::Compute, &options)?;
         let interface = &shader.interface;
         layout.check(interface)?;
         let invocations = invocations(interface)?;

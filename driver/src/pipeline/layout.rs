@@ -47,6 +47,22 @@ impl PipelineLayout {
         })
     }
 
+    /// The sets and push constants of two layouts. The layouts of a pipeline's libraries agree on a set that both have.
+    pub(crate) fn union(one: &Arc<Self>, other: &Arc<Self>) -> Arc<Self> {
+        if Arc::ptr_eq(one, other) {
+            return Arc::clone(one);
+        }
+        let count = one.set_layouts.len().max(other.set_layouts.len());
+        let set = |number: usize| {
+            let of = |layout: &Self| layout.set_layouts.get(number).cloned().flatten();
+            of(one).or_else(|| of(other))
+        };
+        Arc::new(Self {
+            set_layouts: (0..count).map(set).collect(),
+            push_constants: [&one.push_constants[..], &other.push_constants].concat(),
+        })
+    }
+
     /// The layout of set number `set`.
     ///
     /// # Errors

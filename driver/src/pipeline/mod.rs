@@ -1,13 +1,19 @@
 //! Pipelines: the parts of create infos that draws and dispatches use, converted and validated once.
 //!
-//! [`GraphicsState`] and [`ShaderStage`] follow the create infos' pointers; all other code is safe.
+//! A graphics pipeline's create info is read into the parts that it has ([`GraphicsState`]), beside those of the libraries
+//! that it links. A library keeps its parts, with its shaders translated; a pipeline is made of all of them, for which the
+//! programs are compiled.
+//!
+//! `create_info` and [`ShaderStage`] follow the create infos' pointers.
 
 pub(crate) mod compute;
+mod create_info;
 pub(crate) mod dynamic_state;
 pub(crate) mod gaussian;
 pub(crate) mod layout;
 mod link;
 mod link_primitives;
+pub(crate) mod parts;
 pub(crate) mod primitives;
 pub(crate) mod stages;
 pub(crate) mod state;
@@ -17,8 +23,8 @@ mod varyings;
 
 use self::compute::ComputePipeline;
 use self::gaussian::GaussianPipeline;
+use self::parts::GraphicsState;
 use self::primitives::PrimitivePipeline;
-use self::state::GraphicsState;
 use crate::abi::error::Error;
 use crate::abi::handle::{self, objects};
 use crate::abi::valid;
@@ -38,6 +44,8 @@ pub(crate) enum Pipeline {
     Graphics(Arc<GraphicsPipeline>),
     /// A pipeline for dispatches.
     Compute(Arc<ComputePipeline>),
+    /// A library: parts of graphics pipelines.
+    Library(Box<GraphicsState>),
 }
 
 /// A graphics pipeline.
@@ -87,7 +95,36 @@ impl GraphicsPipeline {
 #[derive(Debug)]
 pub(crate) struct PipelineCache;
 
-/// Creates one pipeline.
+/// The libraries that a graphics pipeline links.
+///
+/// # Safety
+/// The create info and its chain are valid.
+unsafe fn libraries<'a>(
+    info: &'a vk::GraphicsPipelineCreateInfo<'_>,
+) -> Result<Vec<&'a GraphicsState>, Error> {
+    // SAFETY: the caller's promise.
+    let handles = unsafe {
+        match valid::find_in_chain::<vk::PipelineLibraryCreateInfoKHR<'_>>(info.p_next) {
+            Some(given) => valid::slice(given.p_libraries, given.library_count)?,
+            None => &[],
+        }
+    };
+    let library = |(index, &handle): (usize, &vk::Pipeline)| {
+        // SAFETY: the caller's promise.
+        match &**unsafe { handle::get(handle)? } {
+            Pipeline::Library(library) => Ok(&**library),
+            Pipeline::Graphics(_) | Pipeline::Compute(_) => Err(Error::usage(
+                "VUID-VkPipelineLibraryCreateInfoKHR-pLibraries-03381",
+                format!(
+                    "pLibraries[{index}] was created without VK_PIPELINE_CREATE_LIBRARY_BIT_KHR"
+                ),
+            )),
+        }
+    };
+    handles.iter().enumerate().map(library).collect()
+}
+
+/// Creates one pipeline, or a library.
 ///
 /// # Safety
 /// The create info and its chain are valid.
@@ -95,11 +132,24 @@ unsafe fn new_graphics_pipeline(
     device: &Device,
     info: &vk::GraphicsPipelineCreateInfo<'_>,
 ) -> Result<Pipeline, Error> {
+    let is_library = info.flags.contains(vk::PipelineCreateFlags::LIBRARY_KHR);
+    if is_library && !device.features().graphics_pipeline_library {
+        return Err(Error::FeatureNotEnabled {
+            vuid: "VUID-VkGraphicsPipelineCreateInfo-graphicsPipelineLibrary-06606",
+            message: "flags has VK_PIPELINE_CREATE_LIBRARY_BIT_KHR, and graphicsPipelineLibrary is not enabled"
+                .into(),
+        });
+    }
     // SAFETY: the caller's promise.
-    let gathered = unsafe {
+    let mut gathered = unsafe {
         write_empty_creation_feedback(info.p_next)?;
-        GraphicsState::from_create_info(info)?
+        create_info::read(device, info, &libraries(info)?)?
     };
+    if is_library {
+        stages::translate_library(device, &mut gathered)?;
+        return Ok(Pipeline::Library(Box::new(gathered)));
+    }
+    gathered.require_complete()?;
     let pipeline = GraphicsPipeline::new(device, &gathered)?;
     Ok(Pipeline::Graphics(Arc::new(pipeline)))
 }
@@ -112,6 +162,9 @@ unsafe fn new_compute_pipeline(
     device: &Device,
     info: &vk::ComputePipelineCreateInfo<'_>,
 ) -> Result<Pipeline, Error> {
+    if info.flags.contains(vk::PipelineCreateFlags::LIBRARY_KHR) {
+        return Err(Error::FeatureNotPresent("a library of compute".into()));
+    }
     if info.stage.stage != vk::ShaderStageFlags::COMPUTE {
         return Err(Error::usage(
             "VUID-VkComputePipelineCreateInfo-stage-00701",
@@ -122,7 +175,11 @@ unsafe fn new_compute_pipeline(
     let pipeline = unsafe {
         write_empty_creation_feedback(info.p_next)?;
         let layout = handle::get(info.layout)?;
-        ComputePipeline::new(device, layout, &ShaderStage::from_create_info(&info.stage)?)?
+        ComputePipeline::new(
+            device,
+            layout,
+            &ShaderStage::from_create_info(device, &info.stage)?,
+        )?
     };
     Ok(Pipeline::Compute(Arc::new(pipeline)))
 }

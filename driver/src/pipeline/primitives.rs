@@ -4,10 +4,10 @@ use super::dynamic_state;
 use super::layout::PipelineLayout;
 use super::link::{self, StageShaders};
 use super::link_primitives::{self, TessellationShaders};
+use super::parts::GraphicsState;
 use super::stages::{self, ProgramResources};
 use super::state::{
-    self, AttributeSource, Class, FixedFunctionState, GraphicsState, live_color_outputs,
-    reads_second_source,
+    self, AttributeSource, Class, FixedFunctionState, live_color_outputs, reads_second_source,
 };
 use super::varyings::LiveOutputs;
 use crate::abi::error::Error;
@@ -74,7 +74,7 @@ impl PrimitivePipeline {
         let mut fixed = FixedFunctionState::new(info)?;
         fixed.draw.unrestricted_depth = device.has(ash::ext::depth_range_unrestricted::NAME);
         let (dynamic, viewports, scissors) = dynamic(info)?;
-        let layout = info.layout.ok_or_else(|| {
+        let layout = info.layout.as_ref().ok_or_else(|| {
             Error::usage(
                 "VUID-VkGraphicsPipelineCreateInfo-layout-06602",
                 "the pipeline has no layout",
@@ -92,7 +92,7 @@ impl PrimitivePipeline {
         let attributes = if is_dynamic {
             Vec::new()
         } else {
-            stages::attributes(&info.vertex_input, &locations)?
+            stages::attributes(&info.vertex_input.input, &locations)?
         };
         if let Some(fragment) = &shaders.fragment {
             let last = &shaders.last().interface;
@@ -119,7 +119,7 @@ impl PrimitivePipeline {
                 || shaders.tessellation.is_some()
                 || info.is_dynamic(vk::DynamicState::POLYGON_MODE_EXT)
                 || fixed.draw.polygon_mode == PolygonMode::Point,
-            views: info.fragment_output.view_mask != 0,
+            views: info.pre_rasterization.view_mask != 0,
         };
         let stream = |location| locations.iter().position(|(read, _)| *read == location);
         let programs = link::link(shaders, stream, live_outputs)?;
@@ -148,12 +148,12 @@ impl PrimitivePipeline {
 
 /// The stages of a pipeline.
 struct Stages<'a> {
-    vertex: &'a ShaderStage<'a>,
+    vertex: &'a ShaderStage,
     /// The tessellation control and evaluation stages.
-    tessellation: Option<[&'a ShaderStage<'a>; 2]>,
-    geometry: Option<&'a ShaderStage<'a>>,
+    tessellation: Option<[&'a ShaderStage; 2]>,
+    geometry: Option<&'a ShaderStage>,
     /// The fragment stage; None if nothing is rasterized.
-    fragment: Option<&'a ShaderStage<'a>>,
+    fragment: Option<&'a ShaderStage>,
 }
 
 impl<'a> Stages<'a> {
@@ -320,7 +320,7 @@ fn dynamic(
     use vk::DynamicState as S;
     let (mut viewports, mut scissors) = (ViewportSource::Static, ViewportSource::Static);
     let mut dynamic = Vec::new();
-    for &state in info.dynamic {
+    for &state in &info.dynamic {
         match state {
             S::VIEWPORT => {
                 viewports = ViewportSource::Dynamic(info.pre_rasterization.viewport_count);

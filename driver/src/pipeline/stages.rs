@@ -3,7 +3,8 @@
 
 use super::layout::PipelineLayout;
 use super::link;
-use super::state::{AttributeSource, VertexInputState, source};
+use super::parts::{GraphicsState, VertexInput};
+use super::state::{AttributeSource, source};
 use crate::abi::error::Error;
 use crate::device::Device;
 use crate::device_addresses::Addresses;
@@ -40,6 +41,9 @@ impl ProgramResources {
 }
 
 /// Translates a stage and compares it with the layout.
+///
+/// # Errors
+/// [`Error::InvalidShader`], or [`Error::InvalidUsage`] if the stage does not fit the layout.
 pub(crate) fn translate(
     device: &Device,
     layout: &PipelineLayout,
@@ -55,12 +59,10 @@ pub(crate) fn translate(
     }
     let options = Options {
         subgroup_size: limits::SUBGROUP_SIZE,
-        samples,
+        samples: if kind == Stage::Fragment { samples } else { 1 },
         unsized_descriptors: layout.longest_binding(),
     };
-    let shader = stage
-        .module
-        .translate(stage.name, kind, &stage.specialization, &options)?;
+    let shader = stage.translate(kind, &options)?;
     layout.check(&shader.interface)?;
     if device.dumps_ir() {
         eprintln!("{kind} shader {}:\n{}", stage.name, shader.program);
@@ -68,12 +70,39 @@ pub(crate) fn translate(
     Ok(shader)
 }
 
+/// Translates the stages of a library for pipelines with one sample, and compares them with the layout. What needs other
+/// options is translated again when it is linked.
+///
+/// # Errors
+/// As [`translate`].
+pub(crate) fn translate_library(device: &Device, library: &mut GraphicsState) -> Result<(), Error> {
+    let Some(layout) = library.layout.clone() else {
+        return Ok(());
+    };
+    let kind = |stage| match stage {
+        vk::ShaderStageFlags::VERTEX => Some(Stage::Vertex),
+        vk::ShaderStageFlags::TESSELLATION_CONTROL => Some(Stage::TessellationControl),
+        vk::ShaderStageFlags::TESSELLATION_EVALUATION => Some(Stage::TessellationEvaluation),
+        vk::ShaderStageFlags::GEOMETRY => Some(Stage::Geometry),
+        vk::ShaderStageFlags::FRAGMENT => Some(Stage::Fragment),
+        _ => None,
+    };
+    for (stage, shader) in library.stages_mut() {
+        if let Some(kind) = kind(*stage)
+            && shader.keep_translations()
+        {
+            translate(device, &layout, shader, kind, 1)?;
+        }
+    }
+    Ok(())
+}
+
 /// The sources of the attributes at locations.
 ///
 /// # Errors
 /// [`Error::InvalidUsage`] for a location without an attribute, or with an attribute of another numeric type.
 pub(crate) fn attributes(
-    info: &VertexInputState,
+    info: &VertexInput,
     locations: &[(u32, ScalarType)],
 ) -> Result<Vec<AttributeSource>, Error> {
     let source = |&(location, _): &(u32, ScalarType)| {

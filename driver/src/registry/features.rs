@@ -366,6 +366,8 @@ pub(crate) struct Features {
     pub(crate) extended_dynamic_state3_representative_fragment_test_enable: bool,
     /// `extendedDynamicState3ShadingRateImageEnable`.
     pub(crate) extended_dynamic_state3_shading_rate_image_enable: bool,
+    /// `graphicsPipelineLibrary`.
+    pub(crate) graphics_pipeline_library: bool,
     /// `image2DViewOf3D`.
     pub(crate) image2_d_view_of3_d: bool,
     /// `sampler2DViewOf3D`.
@@ -682,6 +684,7 @@ pub(crate) const SUPPORTED: Features = Features {
     extended_dynamic_state3_line_rasterization_mode: true,
     extended_dynamic_state3_line_stipple_enable: true,
     extended_dynamic_state3_depth_clip_negative_one_to_one: true,
+    graphics_pipeline_library: true,
     image2_d_view_of3_d: true,
     sampler2_d_view_of3_d: true,
     index_type_uint8: true,
@@ -930,6 +933,7 @@ impl Features {
         extended_dynamic_state3_coverage_reduction_mode: false,
         extended_dynamic_state3_representative_fragment_test_enable: false,
         extended_dynamic_state3_shading_rate_image_enable: false,
+        graphics_pipeline_library: false,
         image2_d_view_of3_d: false,
         sampler2_d_view_of3_d: false,
         index_type_uint8: false,
@@ -1018,7 +1022,7 @@ impl Features {
     };
 
     /// The features by their names.
-    pub(crate) fn list(&self) -> [(&'static str, bool); 263] {
+    pub(crate) fn list(&self) -> [(&'static str, bool); 264] {
         [
             ("robustBufferAccess", self.robust_buffer_access),
             ("fullDrawIndexUint32", self.full_draw_index_uint32),
@@ -1468,6 +1472,7 @@ impl Features {
                 "extendedDynamicState3ShadingRateImageEnable",
                 self.extended_dynamic_state3_shading_rate_image_enable,
             ),
+            ("graphicsPipelineLibrary", self.graphics_pipeline_library),
             ("image2DViewOf3D", self.image2_d_view_of3_d),
             ("sampler2DViewOf3D", self.sampler2_d_view_of3_d),
             ("indexTypeUint8", self.index_type_uint8),
@@ -2249,6 +2254,11 @@ impl Features {
                 .extended_dynamic_state3_shading_rate_image_enable
                 .into();
         }
+        if let Some(out) =
+            structure.cast::<vk::PhysicalDeviceGraphicsPipelineLibraryFeaturesEXT<'_>>()
+        {
+            out.graphics_pipeline_library = self.graphics_pipeline_library.into();
+        }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceImage2DViewOf3DFeaturesEXT<'_>>() {
             out.image2_d_view_of3_d = self.image2_d_view_of3_d.into();
             out.sampler2_d_view_of3_d = self.sampler2_d_view_of3_d.into();
@@ -2894,6 +2904,11 @@ impl Features {
                 requested.extended_dynamic_state3_shading_rate_image_enable != vk::FALSE;
         }
         if let Some(requested) =
+            valid::cast::<vk::PhysicalDeviceGraphicsPipelineLibraryFeaturesEXT<'_>>(structure)
+        {
+            self.graphics_pipeline_library |= requested.graphics_pipeline_library != vk::FALSE;
+        }
+        if let Some(requested) =
             valid::cast::<vk::PhysicalDeviceImage2DViewOf3DFeaturesEXT<'_>>(structure)
         {
             self.image2_d_view_of3_d |= requested.image2_d_view_of3_d != vk::FALSE;
@@ -3134,6 +3149,9 @@ pub(crate) fn extension_of(structure: vk::StructureType) -> Option<&'static CStr
         }
         vk::PhysicalDeviceExtendedDynamicState3FeaturesEXT::STRUCTURE_TYPE => {
             Some(c"VK_EXT_extended_dynamic_state3")
+        }
+        vk::PhysicalDeviceGraphicsPipelineLibraryFeaturesEXT::STRUCTURE_TYPE => {
+            Some(c"VK_EXT_graphics_pipeline_library")
         }
         vk::PhysicalDeviceImage2DViewOf3DFeaturesEXT::STRUCTURE_TYPE => {
             Some(c"VK_EXT_image_2d_view_of_3d")

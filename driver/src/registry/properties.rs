@@ -474,6 +474,10 @@ pub(crate) struct Properties {
     pub(crate) max_custom_border_color_samplers: u32,
     /// `dynamicPrimitiveTopologyUnrestricted`.
     pub(crate) dynamic_primitive_topology_unrestricted: bool,
+    /// `graphicsPipelineLibraryFastLinking`.
+    pub(crate) graphics_pipeline_library_fast_linking: bool,
+    /// `graphicsPipelineLibraryIndependentInterpolationDecoration`.
+    pub(crate) graphics_pipeline_library_independent_interpolation_decoration: bool,
     /// `lineSubPixelPrecisionBits`.
     pub(crate) line_sub_pixel_precision_bits: u32,
     /// `maxMultiDrawCount`.
@@ -1142,6 +1146,15 @@ impl Properties {
         {
             out.dynamic_primitive_topology_unrestricted =
                 self.dynamic_primitive_topology_unrestricted.into();
+        }
+        if let Some(out) =
+            structure.cast::<vk::PhysicalDeviceGraphicsPipelineLibraryPropertiesEXT<'_>>()
+        {
+            out.graphics_pipeline_library_fast_linking =
+                self.graphics_pipeline_library_fast_linking.into();
+            out.graphics_pipeline_library_independent_interpolation_decoration = self
+                .graphics_pipeline_library_independent_interpolation_decoration
+                .into();
         }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceLineRasterizationPropertiesKHR<'_>>()
         {

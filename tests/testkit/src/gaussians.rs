@@ -193,6 +193,46 @@ impl GaussianOptions<'_> {
             ..Self::new(degree)
         }
     }
+
+    /// All state of the pipeline.
+    pub fn graphics(&self) -> Graphics<'_> {
+        let mut locations = attribute_locations();
+        if self.instances.is_some() {
+            locations = locations
+                .first_model_matrix(MODEL_MATRIX)
+                .model_opacity(MODEL_OPACITY);
+        }
+        let state = self
+            .state
+            .spherical_harmonics_degree(self.drawn_degree)
+            .attribute_locations(locations);
+        let mut blend = self.blend.clone();
+        blend.resize(self.formats.colors.len(), self.blend[0]);
+        let mut dynamic = vec![vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
+        dynamic.extend(&self.dynamic);
+        Graphics {
+            shaders: self.resolve.iter().cloned().collect(),
+            set_layouts: self.set.iter().map(|set| set.layout).collect(),
+            bindings: bindings(self),
+            attributes: all_attributes(self),
+            topology: PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST,
+            sample_mask: Some(self.sample_mask),
+            negative_one_to_one: self.negative_one_to_one,
+            depth_stencil: self.depth_stencil,
+            logic_op: self.logic_op,
+            blend,
+            dynamic,
+            multisample: vk::PipelineMultisampleStateCreateInfo::default()
+                .rasterization_samples(vk::SampleCountFlags::from_raw(self.formats.samples)),
+            formats: self.formats.colors.clone(),
+            depth_format: self.formats.depth,
+            subpass: self.render_pass.map(|pass| (pass, 0)),
+            gaussian: Some(state),
+            approximation: self.approximation,
+            footprint: self.footprint,
+            ..Graphics::default()
+        }
+    }
 }
 
 /// Blending of (C, 1 - T) over the attachment's contents.
@@ -215,43 +255,7 @@ impl GaussianPipeline {
     /// # Panics
     /// If the driver refuses it.
     pub fn new(gpu: &Gpu, options: &GaussianOptions<'_>) -> Self {
-        let mut locations = attribute_locations();
-        if options.instances.is_some() {
-            locations = locations
-                .first_model_matrix(MODEL_MATRIX)
-                .model_opacity(MODEL_OPACITY);
-        }
-        let state = options
-            .state
-            .spherical_harmonics_degree(options.drawn_degree)
-            .attribute_locations(locations);
-        let mut blend = options.blend.clone();
-        blend.resize(options.formats.colors.len(), options.blend[0]);
-        let mut dynamic = vec![vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
-        dynamic.extend(&options.dynamic);
-        let graphics = Graphics {
-            shaders: options.resolve.iter().cloned().collect(),
-            set_layouts: options.set.iter().map(|set| set.layout).collect(),
-            bindings: bindings(options),
-            attributes: all_attributes(options),
-            topology: PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST,
-            sample_mask: Some(options.sample_mask),
-            negative_one_to_one: options.negative_one_to_one,
-            depth_stencil: options.depth_stencil,
-            logic_op: options.logic_op,
-            blend,
-            dynamic,
-            multisample: vk::PipelineMultisampleStateCreateInfo::default()
-                .rasterization_samples(vk::SampleCountFlags::from_raw(options.formats.samples)),
-            formats: options.formats.colors.clone(),
-            depth_format: options.formats.depth,
-            subpass: options.render_pass.map(|pass| (pass, 0)),
-            gaussian: Some(state),
-            approximation: options.approximation,
-            footprint: options.footprint,
-            ..Graphics::default()
-        };
-        Self(graphics.create(gpu).expect("a pipeline"))
+        Self(options.graphics().create(gpu).expect("a pipeline"))
     }
 }
 

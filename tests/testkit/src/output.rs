@@ -5,7 +5,7 @@ use ash::vk;
 use crate::resource::texel_size;
 
 /// The images that a scene draws, in the order in which it made them.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Output {
     /// The pictures, in the order in which they were made.
     pub pictures: Vec<Picture>,
@@ -35,7 +35,7 @@ impl Output {
 }
 
 /// One image: an attachment, or one sample of it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Picture {
     /// The picture's name.
     pub name: String,

@@ -11,6 +11,7 @@ use crate::gpu::{Commands, Gpu};
 use crate::pass::{Attachments, Bindable};
 use crate::resource::{Buffer, depth_and_stencil};
 use crate::shader::{Stage, compile};
+use vk::GraphicsPipelineLibraryFlagsEXT as Parts;
 
 /// A shader of a pipeline.
 #[derive(Clone, Debug)]
@@ -56,6 +57,16 @@ pub struct Graphics<'a> {
     pub push: Vec<vk::PushConstantRange>,
     /// True if creation gets a pipeline layout.
     pub has_layout: bool,
+    /// Flags of that layout.
+    pub layout_flags: vk::PipelineLayoutCreateFlags,
+    /// Flags of creation.
+    pub flags: vk::PipelineCreateFlags,
+    /// The parts that creation gets, without the state of others, or `None` for all.
+    pub parts: Option<vk::GraphicsPipelineLibraryFlagsEXT>,
+    /// Libraries with further parts.
+    pub libraries: Vec<vk::Pipeline>,
+    /// True if stages have their shaders' code, not modules.
+    pub inline_modules: bool,
     /// The vertex bindings.
     pub bindings: Vec<vk::VertexInputBindingDescription>,
     /// The instance divisors of vertex bindings.
@@ -98,8 +109,6 @@ pub struct Graphics<'a> {
     pub depth_format: vk::Format,
     /// The views of dynamic rendering, one bit each.
     pub view_mask: u32,
-    /// The flags of its creation.
-    pub flags: vk::PipelineCreateFlags,
     /// A render pass object and subpass, in place of dynamic rendering.
     pub subpass: Option<(vk::RenderPass, u32)>,
     /// The state of Gaussian draws.
@@ -117,6 +126,11 @@ impl Default for Graphics<'_> {
             set_layouts: Vec::new(),
             push: Vec::new(),
             has_layout: true,
+            layout_flags: vk::PipelineLayoutCreateFlags::empty(),
+            flags: vk::PipelineCreateFlags::empty(),
+            parts: None,
+            libraries: Vec::new(),
+            inline_modules: false,
             bindings: Vec::new(),
             divisors: Vec::new(),
             attributes: Vec::new(),
@@ -139,7 +153,6 @@ impl Default for Graphics<'_> {
             formats: vec![vk::Format::R32G32B32A32_SFLOAT],
             depth_format: vk::Format::UNDEFINED,
             view_mask: 0,
-            flags: vk::PipelineCreateFlags::empty(),
             subpass: None,
             gaussian: None,
             approximation: None,
@@ -172,14 +185,21 @@ impl Graphics<'_> {
     /// # Panics
     /// If a shader module is refused, or the driver gives a pipeline that it refused.
     pub fn create(&self, gpu: &Gpu) -> Result<Pipeline, vk::Result> {
-        let layout = create_layout(gpu, &self.set_layouts, &self.push);
+        let layout = create_layout(gpu, &self.set_layouts, &self.push, self.layout_flags);
         let mut pipeline = Pipeline {
             raw: vk::Pipeline::null(),
             layout,
             gpu: gpu.clone(),
         };
-        let modules = self.shaders.iter().map(|shader| module(gpu, &shader.words));
+        let modules = self.shaders.iter().map(|shader| match self.inline_modules {
+            true => vk::ShaderModule::null(),
+            false => module(gpu, &shader.words),
+        });
         let modules: Vec<_> = modules.collect();
+        let codes = self.shaders.iter();
+        let mut codes: Vec<_> = codes
+            .map(|shader| vk::ShaderModuleCreateInfo::default().code(&shader.words))
+            .collect();
         let constants = self.shaders.iter();
         let constants: Vec<_> = constants
             .map(|shader| specialization(&shader.constants))
@@ -191,13 +211,17 @@ impl Graphics<'_> {
                     .data(bytemuck::cast_slice(values))
             })
             .collect();
-        let stages: Vec<_> = (0..modules.len())
-            .map(|index| {
-                vk::PipelineShaderStageCreateInfo::default()
+        let stages: Vec<_> = (codes.iter_mut().enumerate())
+            .map(|(index, code)| {
+                let stage = vk::PipelineShaderStageCreateInfo::default()
                     .stage(self.shaders[index].stage)
                     .module(modules[index])
                     .name(c"main")
-                    .specialization_info(&specializations[index])
+                    .specialization_info(&specializations[index]);
+                match self.inline_modules {
+                    true => stage.push_next(code),
+                    false => stage,
+                }
             })
             .collect();
         let created = self.create_of(gpu, layout, &stages);
@@ -207,6 +231,11 @@ impl Graphics<'_> {
         }
         pipeline.raw = created?;
         Ok(pipeline)
+    }
+
+    /// Reports whether creation gets a part.
+    fn has(&self, part: Parts) -> bool {
+        self.parts.is_none_or(|parts| parts.contains(part))
     }
 
     fn create_of(
@@ -265,19 +294,33 @@ impl Graphics<'_> {
         let mut gaussian = self.gaussian.unwrap_or_default();
         let mut approximation = self.approximation.unwrap_or_default();
         let mut footprint = self.footprint.unwrap_or_default();
+        let mut parts = vk::GraphicsPipelineLibraryCreateInfoEXT::default()
+            .flags(self.parts.unwrap_or_default());
+        let mut libraries = vk::PipelineLibraryCreateInfoKHR::default().libraries(&self.libraries);
         let mut info = vk::GraphicsPipelineCreateInfo::default()
             .flags(self.flags)
-            .stages(stages)
-            .vertex_input_state(&vertex_input)
-            .input_assembly_state(&assembly)
-            .viewport_state(&viewport)
-            .rasterization_state(&raster)
-            .multisample_state(&multisample)
-            .depth_stencil_state(&self.depth_stencil)
-            .color_blend_state(&blend)
             .dynamic_state(&dynamic);
-        if self.patch_vertices > 0 {
-            info = info.tessellation_state(&tessellation);
+        if self.has(Parts::VERTEX_INPUT_INTERFACE) {
+            info = info
+                .vertex_input_state(&vertex_input)
+                .input_assembly_state(&assembly);
+        }
+        if self.has(Parts::PRE_RASTERIZATION_SHADERS) {
+            info = info.viewport_state(&viewport).rasterization_state(&raster);
+            if self.patch_vertices > 0 {
+                info = info.tessellation_state(&tessellation);
+            }
+        }
+        if self.has(Parts::FRAGMENT_SHADER) {
+            info = info.depth_stencil_state(&self.depth_stencil);
+        }
+        if self.has(Parts::FRAGMENT_OUTPUT_INTERFACE) {
+            info = info
+                .multisample_state(&multisample)
+                .color_blend_state(&blend);
+        }
+        if self.has(Parts::PRE_RASTERIZATION_SHADERS) || self.has(Parts::FRAGMENT_SHADER) {
+            info = info.stages(stages);
         }
         if self.has_layout {
             info = info.layout(layout);
@@ -286,6 +329,12 @@ impl Graphics<'_> {
             Some((render_pass, subpass)) => info.render_pass(render_pass).subpass(subpass),
             None => info.push_next(&mut rendering),
         };
+        if self.parts.is_some() {
+            info = info.push_next(&mut parts);
+        }
+        if !self.libraries.is_empty() {
+            info = info.push_next(&mut libraries);
+        }
         if self.gaussian.is_some() {
             info = info.push_next(&mut gaussian);
         }
@@ -628,7 +677,7 @@ impl Kernel {
             .size(128)];
         let mut kernel = Self {
             raw: vk::Pipeline::null(),
-            layout: create_layout(gpu, sets, &ranges),
+            layout: create_layout(gpu, sets, &ranges, vk::PipelineLayoutCreateFlags::empty()),
             gpu: gpu.clone(),
         };
         let device = gpu.device();
@@ -789,8 +838,10 @@ fn create_layout(
     gpu: &Gpu,
     sets: &[vk::DescriptorSetLayout],
     ranges: &[vk::PushConstantRange],
+    flags: vk::PipelineLayoutCreateFlags,
 ) -> vk::PipelineLayout {
     let info = vk::PipelineLayoutCreateInfo::default()
+        .flags(flags)
         .set_layouts(sets)
         .push_constant_ranges(ranges);
     // SAFETY: see the crate.

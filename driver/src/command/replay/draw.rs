@@ -154,8 +154,7 @@ fn dynamic_sources(
 ) -> Result<Vec<AttributeSource>, DrawError> {
     let missing = DrawError::Dynamic(vk::DynamicState::VERTEX_INPUT_EXT);
     let input = state.vertex_input.as_ref().ok_or(missing)?;
-    stages::attributes(&input.state(), locations)
-        .map_err(|error| DrawError::VertexInput(error.to_string()))
+    stages::attributes(input, locations).map_err(|error| DrawError::VertexInput(error.to_string()))
 }
 
 /// The stream that an indexed draw's indices are read from.

@@ -8,7 +8,7 @@ use crate::pipeline::GraphicsPipeline;
 use crate::pipeline::compute::ComputePipeline;
 use crate::pipeline::dynamic_state::DynamicStates;
 use crate::pipeline::gaussian::GaussianPipeline;
-use crate::pipeline::state::VertexInput;
+use crate::pipeline::parts::VertexInput;
 use simdevice::packet::GaussianBegin;
 use simdevice::state::gaussian::Camera;
 use simdevice::state::{DrawState, Rect, Viewport};
@@ -129,9 +129,9 @@ pub(crate) struct BoundSets(Vec<Option<BoundSet>>);
 
 impl BoundSets {
     /// Binds sets from number `first` on.
-    pub(crate) fn bind(&mut self, first: u32, sets: &[BoundSet]) {
+    pub(crate) fn bind(&mut self, first: u32, sets: &[Option<BoundSet>]) {
         for (number, set) in (first..).zip(sets) {
-            *slot(&mut self.0, number) = Some(set.clone());
+            slot(&mut self.0, number).clone_from(set);
         }
     }
 
@@ -156,7 +156,7 @@ impl BoundSets {
                     set: Arc::clone(&set),
                     dynamic_offsets: Vec::new(),
                 };
-                self.bind(number, &[bound]);
+                self.bind(number, &[Some(bound)]);
                 set
             }
         };

@@ -7,7 +7,8 @@ pub(crate) mod values;
 use self::stages::{ResolveStage, VertexProjection};
 use self::valid_usage::*;
 use super::dynamic_state::{GaussianStates, is_taken_by_gaussians};
-use super::state::{AttributeSource, FixedFunctionState, GraphicsState, attribute};
+use super::parts::GraphicsState;
+use super::state::{AttributeSource, FixedFunctionState, attribute};
 use crate::abi::error::Error;
 use crate::convert;
 use crate::descriptor::layout::LayoutBinding;
@@ -145,7 +146,7 @@ impl GaussianPipeline {
     pub(crate) fn new(device: &Device, info: &GraphicsState) -> Result<Self, Error> {
         let features = device.features();
         require(features, TOPOLOGY, "the topology is the Gaussian list")?;
-        let Some(gaussian) = &info.gaussian else {
+        let Some(gaussian) = &info.pre_rasterization.gaussian else {
             return Err(Error::usage(
                 "VUID-VkGraphicsPipelineCreateInfo-topology-90007",
                 format!(
@@ -155,7 +156,7 @@ impl GaussianPipeline {
                 ),
             ));
         };
-        let view_mask = info.fragment_output.view_mask;
+        let view_mask = info.pre_rasterization.view_mask;
         if view_mask != 0 {
             require(features, MULTIVIEW, "the view mask is not 0")?;
         }
@@ -193,14 +194,14 @@ impl GaussianPipeline {
                 "viewport",
                 info.is_dynamic(vk::DynamicState::VIEWPORT)
                     || info.is_dynamic(vk::DynamicState::VIEWPORT_WITH_COUNT),
-                info.pre_rasterization.viewports,
+                &info.pre_rasterization.viewports,
             )?
             .map(convert::viewport),
             scissor: fixed(
                 "scissor",
                 info.is_dynamic(vk::DynamicState::SCISSOR)
                     || info.is_dynamic(vk::DynamicState::SCISSOR_WITH_COUNT),
-                info.pre_rasterization.scissors,
+                &info.pre_rasterization.scissors,
             )?
             .map(convert::rect),
             camera: camera_source(info, gaussian, features)?,
@@ -351,7 +352,7 @@ fn camera_source(
         "cameraSource is UNIFORM_BUFFER",
     )?;
     let (set, binding) = (gaussian.camera_set, gaussian.camera_binding);
-    let is_there = info.layout.is_some_and(|layout| {
+    let is_there = info.layout.as_ref().is_some_and(|layout| {
         let found = layout.set_layout(set).ok();
         found
             .and_then(|set| set.binding(binding))
@@ -367,14 +368,14 @@ fn camera_source(
         ));
     }
     let count = gaussian.camera_count;
-    let views = u32::BITS - info.fragment_output.view_mask.leading_zeros();
+    let views = u32::BITS - info.pre_rasterization.view_mask.leading_zeros();
     if count == 0 || count > 1 && count < views {
         return Err(Error::usage(
             "VUID-VkPipelineGaussianStateCreateInfoGAURAST-cameraCount-90026",
             format!(
                 "{STRUCTURE}: cameraCount is {count}, but must be 1, for all views, or greater than the greatest view \
                  index of view mask {:#b}",
-                info.fragment_output.view_mask
+                info.pre_rasterization.view_mask
             ),
         ));
     }

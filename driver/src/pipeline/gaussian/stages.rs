@@ -4,9 +4,10 @@ use crate::abi::error::Error;
 use crate::device::Device;
 use crate::pipeline::layout::PipelineLayout;
 use crate::pipeline::link;
+use crate::pipeline::parts::GraphicsState;
 use crate::pipeline::stages::{self, ProgramResources};
 use crate::pipeline::state::{
-    AttributeSource, FixedFunctionState, GraphicsState, live_color_outputs, reads_second_source,
+    AttributeSource, FixedFunctionState, live_color_outputs, reads_second_source,
 };
 use crate::pipeline::varyings::{InterfaceComponent, LiveOutputs, Varyings};
 use crate::shader_module::ShaderStage;
@@ -53,7 +54,7 @@ impl VertexProjection {
         let vertex = stages::translate(device, layout(info)?, stage, Stage::Vertex, 1)?;
         let components = components(state, &vertex.interface)?;
         let locations = vertex.interface.locations_read();
-        let attributes = stages::attributes(&info.vertex_input, &locations)?;
+        let attributes = stages::attributes(&info.vertex_input.input, &locations)?;
         let resources = ProgramResources::new(device, &vertex.interface);
         let stream = |location| locations.iter().position(|(read, _)| *read == location);
         let programs = link::link_projection(vertex, stream, &components)?;
@@ -108,7 +109,7 @@ impl ResolveStage {
             color: &color,
             second_source: info.fragment_output.blend.iter().any(reads_second_source),
             points: false,
-            views: info.fragment_output.view_mask != 0,
+            views: info.pre_rasterization.view_mask != 0,
         };
         let programs = link::link_resolve(fragment, &varyings, live_outputs);
         let program = GaussianFragmentProgram::new(device.simulated().level(), &programs)
@@ -269,8 +270,8 @@ fn check_resolve(interface: &Interface, varyings: &Varyings) -> Result<(), Error
     Ok(())
 }
 
-fn layout<'a>(info: &GraphicsState<'a>) -> Result<&'a Arc<PipelineLayout>, Error> {
-    info.layout.ok_or_else(|| {
+fn layout(info: &GraphicsState) -> Result<&Arc<PipelineLayout>, Error> {
+    info.layout.as_ref().ok_or_else(|| {
         Error::usage(
             "VUID-VkGraphicsPipelineCreateInfo-layout-06602",
             "the pipeline has no layout",
@@ -279,7 +280,7 @@ fn layout<'a>(info: &GraphicsState<'a>) -> Result<&'a Arc<PipelineLayout>, Error
 }
 
 /// A pipeline's stage of a kind.
-fn find<'a>(info: &'a GraphicsState, wanted: vk::ShaderStageFlags) -> Option<&'a ShaderStage<'a>> {
+fn find(info: &GraphicsState, wanted: vk::ShaderStageFlags) -> Option<&ShaderStage> {
     let mut stages = info.stages();
     let (_, stage) = stages.find(|(stage, _)| *stage == wanted)?;
     Some(stage)

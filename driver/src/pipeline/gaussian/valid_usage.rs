@@ -4,7 +4,8 @@ use super::values;
 use crate::abi::error::Error;
 use crate::physical_device::limits::MAX_SPHERICAL_HARMONICS_DEGREE;
 use crate::pipeline::dynamic_state::{GaussianStates, is_of_gaussians, may_gaussians_have};
-use crate::pipeline::state::{GraphicsState, reads_second_source};
+use crate::pipeline::parts::GraphicsState;
+use crate::pipeline::state::reads_second_source;
 use crate::registry::features::Features;
 use ash::vk;
 use gaurast::vk::{
@@ -228,6 +229,7 @@ impl Modes {
                 .any(is_used),
             reads_camera: resolves && is_used(inputs.first_camera),
             is_cut: info
+                .pre_rasterization
                 .footprint
                 .is_some_and(|footprint| footprint.cut_off != GaussianCutOffGAURAST::NONE),
         }
@@ -584,7 +586,7 @@ pub(super) fn numbers(gaussian: &PipelineGaussianStateCreateInfoGAURAST) -> Resu
 /// Refuses fixed-function state that a Gaussian pipeline doesn't support.
 pub(super) fn fixed_state(info: &GraphicsState, features: &Features) -> Result<(), Error> {
     use vk::DynamicState as S;
-    let depth_stencil = info.fragment_shader.depth_stencil.unwrap_or_default();
+    let depth_stencil = info.depth_stencil().copied().unwrap_or_default();
     let tests = [
         (depth_stencil.depth_test_enable, S::DEPTH_TEST_ENABLE),
         (
@@ -658,7 +660,7 @@ pub(super) fn footprint(
     info: &GraphicsState,
     features: &Features,
 ) -> Result<GaussianFootprint, Error> {
-    let Some(given) = info.footprint else {
+    let Some(given) = info.pre_rasterization.footprint else {
         return Ok(GaussianFootprint::default());
     };
     let cut_off = values::cut_off(given.cut_off).ok_or_else(|| {
@@ -691,7 +693,7 @@ pub(super) fn footprint(
 /// Validates and converts the chain's structure of approximations, if it has one, as far as it is not dynamic.
 pub(super) fn approximation(info: &GraphicsState) -> Result<GaussianApproximation, Error> {
     use vk::DynamicState as S;
-    let given = info.approximation.unwrap_or_default();
+    let given = info.pre_rasterization.approximation.unwrap_or_default();
     let mut own = GaussianApproximation::default();
     if !info.is_dynamic(S::GAUSSIAN_EXPONENTIAL_ERROR) {
         let vuid =
