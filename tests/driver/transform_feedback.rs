@@ -590,7 +590,7 @@ fn wrong_use_is_refused() {
     for (rule, misuse) in CASES {
         let recorded = device.gpu.try_record(|commands| {
             commands.pass(&target, &Pass::zeros(), || {
-                misuse(&device, commands, &buffer)
+                misuse(&device, commands, &buffer);
             });
         });
         assert!(recorded.is_err(), "{rule}");

@@ -36,7 +36,7 @@ fn copies(to: &str, from: &str) -> String {
         let (to, from) = (to.replace('#', name), from.replace('#', name));
         format!("{to} = {from};")
     };
-    names.iter().map(|name| copy(&name)).collect()
+    names.iter().map(copy).collect()
 }
 
 fn vertex() -> String {

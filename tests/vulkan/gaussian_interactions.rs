@@ -573,7 +573,7 @@ fn cameras_and_sets_stay_in_their_command_buffer() {
             // SAFETY: see the crate.
             unsafe { device.cmd_execute_commands(commands, &[whole.raw]) };
         });
-        crate::scene::pass(device, commands, &scene.image, BEHIND, || {
+        pass(device, commands, &scene.image, BEHIND, || {
             let point = vk::PipelineBindPoint::GRAPHICS;
             // SAFETY: see the crate.
             unsafe {
@@ -602,7 +602,7 @@ fn integer_attachments_are_left_as_they_are() {
     let clear = [7, 9, 11, 13].map(f32::from_bits);
     scene.gpu.run(|recording| {
         let (device, commands) = recording.raw();
-        crate::scene::pass(device, commands, &scene.image, clear, || {
+        pass(device, commands, &scene.image, clear, || {
             scene.bind(device, commands);
             draw(device, commands);
         });
@@ -633,7 +633,7 @@ fn bytes(format: vk::Format) -> Vec<[u8; 4]> {
     scene.image = Image::new(&scene.gpu, &options);
     scene.gpu.run(|recording| {
         let (device, commands) = recording.raw();
-        crate::scene::pass(device, commands, &scene.image, BEHIND, || {
+        pass(device, commands, &scene.image, BEHIND, || {
             scene.bind(device, commands);
             // SAFETY: see the crate.
             unsafe { device.cmd_draw(commands, 3, 1, 0, 0) };

@@ -518,6 +518,7 @@ mod tests {
                 per_sample: false,
                 modes: PrimitiveModes::default(),
                 exchange: VertexExchange::default(),
+                transform_feedback: None,
                 has_side_effects: false,
                 uses_addresses: false,
             },

@@ -62,6 +62,7 @@ pub fn programs() -> DrawPrograms {
         vertex_inputs: attribute(0).chain(attribute(1)).collect(),
         vertex_outputs: position.chain(varyings).collect(),
         varyings: 4,
+        captured: None,
         tessellation: None,
         geometry: None,
         fragment: Some(FragmentPrograms {
@@ -114,6 +115,7 @@ pub fn triangles(device: &Device, corners: &[[f32; 4]], tested: bool) -> Packet 
         first_instance: 0,
         instance_count: 1,
         draw_index: 0,
+        transform_feedback: None,
     }))
 }
 
