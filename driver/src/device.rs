@@ -463,6 +463,9 @@ mod tests {
             count::<vk::PhysicalDeviceVulkan13Features<'_>>(),
             count::<vk::PhysicalDevicePerformanceQueryFeaturesKHR<'_>>(),
             count::<vk::PhysicalDeviceGraphicsPipelineLibraryFeaturesEXT<'_>>(),
+            count::<vk::PhysicalDeviceAttachmentFeedbackLoopLayoutFeaturesEXT<'_>>(),
+            count::<vk::PhysicalDeviceTransformFeedbackFeaturesEXT<'_>>(),
+            count::<vk::PhysicalDevicePrimitivesGeneratedQueryFeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceIndexTypeUint8FeaturesKHR<'_>>(),
             count::<vk::PhysicalDeviceExtendedDynamicStateFeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceExtendedDynamicState2FeaturesEXT<'_>>(),
@@ -495,8 +498,8 @@ mod tests {
         assert_eq!(
             counts,
             [
-                42, 9, 43, 14, 1, 1, 1, 1, 3, 1, 1, 2, 2, 2, 2, 1, 1, 1, 2, 2, 1, 3, 2, 1, 6, 3, 4,
-                1, 15, 1, 1, 2, 1, 26
+                42, 9, 43, 14, 1, 1, 1, 2, 3, 1, 1, 3, 1, 2, 2, 2, 2, 2, 1, 1, 1, 2, 2, 1, 3, 2, 1,
+                6, 3, 4, 1, 16, 1, 1, 2, 1, 26
             ]
         );
         assert_eq!(count_of(&SUPPORTED), counts.iter().sum::<usize>());

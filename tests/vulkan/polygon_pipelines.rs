@@ -170,7 +170,7 @@ fn attributes_of_64_bits_are_refused() {
         shaders: vec![Shader::vertex(spirv!("double_attribute.vert"))],
         ..colored()
     };
-    assert_refused(&gpu, &request, LACKING, "64 bits");
+    assert_refused(&gpu, &request, USAGE, "width: 64");
     let outputs = Graphics {
         shaders: vec![Shader::vertex(spirv!("doubles.vert"))],
         ..colored()

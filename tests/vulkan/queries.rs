@@ -204,13 +204,13 @@ fn clocks_are_read_together() {
 #[gaurast_runner::test]
 fn what_cannot_be_measured_is_refused() {
     let gpu = open();
-    let feedback = vk::QueryPoolCreateInfo::default()
-        .query_type(vk::QueryType::TRANSFORM_FEEDBACK_STREAM_EXT)
+    let structures = vk::QueryPoolCreateInfo::default()
+        .query_type(vk::QueryType::ACCELERATION_STRUCTURE_COMPACTED_SIZE_KHR)
         .query_count(1);
-    let unchained = feedback.query_type(vk::QueryType::PERFORMANCE_QUERY_KHR);
+    let unchained = structures.query_type(vk::QueryType::PERFORMANCE_QUERY_KHR);
     let mut unknown = vk::QueryPoolPerformanceCreateInfoKHR::default().counter_indices(&[9999]);
     let unknown = unchained.push_next(&mut unknown);
-    for info in [feedback, unchained, unknown] {
+    for info in [structures, unchained, unknown] {
         // SAFETY: see the crate.
         unsafe { assert!(gpu.device().create_query_pool(&info, None).is_err()) };
     }

@@ -21,7 +21,7 @@ const CAPTURED: BufferRules = BufferRules {
 /// The rules on the counter of `vkCmdDrawIndirectByteCountEXT`.
 const DRAWN_COUNTER: BufferRules = BufferRules {
     memory: "VUID-vkCmdDrawIndirectByteCountEXT-counterBuffer-04567",
-    range: "VUID-vkCmdDrawIndirectByteCountEXT-counterBufferOffset-09474",
+    range: "VUID-vkCmdDrawIndirectByteCountEXT-counterBufferOffset-04568",
 };
 
 /// The rules of a command on the counters of buffers.

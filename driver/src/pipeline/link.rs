@@ -659,10 +659,10 @@ mod tests {
     }
 
     #[test]
-    fn wide_values_are_refused() {
-        let mut wide = to(0, 0);
+    fn wide_attributes_are_refused() {
+        let mut wide = at(0, 0);
         wide.numeric = ScalarType::Float { width: 64 };
-        let vertex = shader(Stage::Vertex, vec![], vec![wide]);
+        let vertex = shader(Stage::Vertex, vec![wide], vec![]);
         let error = link(stages(vertex, None), |_| None, LiveOutputs::default()).unwrap_err();
         assert_eq!(error.result(), ash::vk::Result::ERROR_FEATURE_NOT_PRESENT);
     }
