@@ -38,6 +38,11 @@ impl<'a> Capture<'a> {
         })
     }
 
+    /// The bytes that are captured of a vertex.
+    pub(super) fn vertex_bytes(&self) -> u64 {
+        4 * u64::from(self.outputs.varyings)
+    }
+
     /// Captures primitives, in order.
     pub(super) fn take(
         &self,

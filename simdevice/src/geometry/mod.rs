@@ -78,6 +78,9 @@ const SEGMENT_OF_GEOMETRY: u64 = 256;
 /// The number of such segments that are processed before the memory of the part is looked at.
 const STEP_SEGMENTS: u64 = 16;
 
+/// The captured bytes of a vertex up to which so many segments are processed at a time.
+const CAPTURED_BYTES: u64 = 64;
+
 /// The bytes of host memory after which a part of such segments ends.
 const PART_BYTES: u64 = 64 << 20;
 
@@ -213,8 +216,16 @@ impl<'a> FrontEnd<'a> {
         let mut done: Vec<PrimitiveSegment> = Vec::new();
         let mut bytes = 0;
         while self.next < self.segments && bytes < PART_BYTES {
-            // Segments whose primitives are numbered depend on those before.
-            let count = self.presented.as_ref().map_or(STEP_SEGMENTS, |_| 1);
+            // Segments whose primitives are numbered depend on those before. Large vertices are captured of fewer
+            // segments at a time.
+            let count = match (&self.presented, &self.capture) {
+                (Some(_), _) => 1,
+                (None, Some(capture)) => {
+                    let bytes = capture.vertex_bytes().max(CAPTURED_BYTES);
+                    (STEP_SEGMENTS * CAPTURED_BYTES / bytes).max(1)
+                }
+                (None, None) => STEP_SEGMENTS,
+            };
             let range = self.next..self.segments.min(self.next + count);
             self.next = range.end;
             let step = self.process(range, counters)?;
