@@ -52,7 +52,7 @@ fn library<'a>(graphics: &Graphics<'a>, parts: Parts) -> Graphics<'a> {
     }
 }
 
-/// What links libraries, and has no parts of its own.
+/// A pipeline that links libraries, and has no parts of its own.
 fn link<'a>(graphics: &Graphics<'a>, libraries: &[Pipeline]) -> Graphics<'a> {
     Graphics {
         parts: Some(Parts::empty()),

@@ -550,7 +550,7 @@ fn streams_of_triangles_take_turns() {
     assert_eq!(pixels[0], [10.0; 4], "the first triangle covers the target");
 }
 
-/// What a command may not do is refused by its rule.
+/// Wrong use of a command is refused by its rule.
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn wrong_use_is_refused() {
     type Use = (&'static str, fn(&Device, &Commands, &Buffer));

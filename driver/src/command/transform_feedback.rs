@@ -26,12 +26,15 @@ const DRAWN_COUNTER: BufferRules = BufferRules {
 
 /// The rules of a command on the counters of buffers.
 struct CounterRules {
+    /// Transform feedback must be active, or must not be.
+    state: &'static str,
     counters: BufferRules,
     count: &'static str,
     alignment: &'static str,
 }
 
 const BEGIN_COUNTERS: CounterRules = CounterRules {
+    state: "VUID-vkCmdBeginTransformFeedbackEXT-None-02367",
     counters: BufferRules {
         memory: "VUID-vkCmdBeginTransformFeedbackEXT-pCounterBuffers-02372",
         range: "VUID-vkCmdBeginTransformFeedbackEXT-pCounterBufferOffsets-02370",
@@ -41,6 +44,7 @@ const BEGIN_COUNTERS: CounterRules = CounterRules {
 };
 
 const END_COUNTERS: CounterRules = CounterRules {
+    state: "VUID-vkCmdEndTransformFeedbackEXT-None-02375",
     counters: BufferRules {
         memory: "VUID-vkCmdEndTransformFeedbackEXT-pCounterBuffers-02380",
         range: "VUID-vkCmdEndTransformFeedbackEXT-pCounterBufferOffsets-02378",
@@ -109,13 +113,18 @@ pub(crate) fn cmd_bind_transform_feedback_buffers(
     Ok(())
 }
 
-/// The words of counters.
-fn counter_words(
+/// Makes transform feedback active or ends it. Returns the words of its counters.
+fn set_active(
+    recorder: &mut Recorder,
+    is_active: bool,
     first: u32,
     buffers: Option<Handles<'_, vk::Buffer>>,
     offsets: Option<&[vk::DeviceSize]>,
     rules: &CounterRules,
 ) -> Result<Box<CounterWords>, Error> {
+    recorder.require_pass()?;
+    require_active(recorder, !is_active, rules.state)?;
+    recorder.captures = is_active;
     let mut words = Box::<CounterWords>::default();
     let Some(buffers) = buffers else {
         return Ok(words);
@@ -144,19 +153,12 @@ pub(crate) fn cmd_begin_transform_feedback(
     counter_buffers: Option<Handles<'_, vk::Buffer>>,
     counter_buffer_offsets: Option<&[vk::DeviceSize]>,
 ) -> Result<(), Error> {
-    recorder.require_pass()?;
-    require_active(
-        recorder,
-        false,
-        "VUID-vkCmdBeginTransformFeedbackEXT-None-02367",
-    )?;
-    let counters = counter_words(
+    let (first, buffers, offsets) = (
         first_counter_buffer,
         counter_buffers,
         counter_buffer_offsets,
-        &BEGIN_COUNTERS,
-    )?;
-    recorder.captures = true;
+    );
+    let counters = set_active(recorder, true, first, buffers, offsets, &BEGIN_COUNTERS)?;
     recorder.push(Command::BeginTransformFeedback(counters));
     Ok(())
 }
@@ -168,19 +170,12 @@ pub(crate) fn cmd_end_transform_feedback(
     counter_buffers: Option<Handles<'_, vk::Buffer>>,
     counter_buffer_offsets: Option<&[vk::DeviceSize]>,
 ) -> Result<(), Error> {
-    recorder.require_pass()?;
-    require_active(
-        recorder,
-        true,
-        "VUID-vkCmdEndTransformFeedbackEXT-None-02375",
-    )?;
-    let counters = counter_words(
+    let (first, buffers, offsets) = (
         first_counter_buffer,
         counter_buffers,
         counter_buffer_offsets,
-        &END_COUNTERS,
-    )?;
-    recorder.captures = false;
+    );
+    let counters = set_active(recorder, false, first, buffers, offsets, &END_COUNTERS)?;
     recorder.push(Command::EndTransformFeedback(counters));
     Ok(())
 }

@@ -21,7 +21,7 @@ pub(super) struct Pieces<'a> {
     output: Output,
     pub counters: Counters,
     capture: Option<Capture<'a>>,
-    /// What transform feedback captured of the pieces, with the numbers of their segments and of the pieces in these.
+    /// The captured primitives of the pieces, with the numbers of their segments and of the pieces in these.
     pub captured: Vec<((u64, u32), CapturedPrimitives)>,
     /// The pieces that have primitives, with the numbers of their segments and of the pieces in these.
     pub segments: Vec<((u64, u32), PrimitiveSegment)>,

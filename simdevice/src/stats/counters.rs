@@ -178,7 +178,7 @@ impl Counter {
         Self::PrimitivesOfStream3,
     ];
 
-    /// Those of each vertex stream that transform feedback had to write.
+    /// The primitives of each vertex stream that transform feedback had to write.
     pub const CAPTURE_NEEDED: [Self; MAX_VERTEX_STREAMS] = [
         Self::CaptureNeeded0,
         Self::CaptureNeeded1,
@@ -186,7 +186,7 @@ impl Counter {
         Self::CaptureNeeded3,
     ];
 
-    /// Those of each vertex stream that transform feedback wrote.
+    /// The primitives of each vertex stream that transform feedback wrote.
     pub const CAPTURED: [Self; MAX_VERTEX_STREAMS] = [
         Self::Captured0,
         Self::Captured1,
